@@ -1,0 +1,14 @@
+"""pyomo_fesd: hybrid dynamic systems in Pyomo, solved exactly at their switches.
+
+Importing this registers ``fesd.dcs``, ``fesd.finite_elements`` and ``mpec_hybrid`` with Pyomo.
+"""
+
+import pyomo.environ  # noqa: F401  registers Pyomo's own plug-ins first
+
+from pyomo_fesd.dcs import transformation as _dcs  # noqa: F401
+from pyomo_fesd.elements import transformation as _elements  # noqa: F401
+from pyomo_fesd.errors import FesdError
+from pyomo_fesd.solver import certify
+
+__version__ = '0.1.0'
+__all__ = ['FesdError', 'certify']

@@ -1,0 +1,117 @@
+"""What a Pyomo ``Complementarity`` says, as pairs of expressions ``0 <= G perp H >= 0``.
+
+``pyomo.mpec`` keeps the user's two arguments as they were written (``_args``); its own standard form adds a variable and an
+equation to every condition and refuses forms that people write.  Here the arguments are only read, nothing is added.
+"""
+
+from typing import NamedTuple
+
+from pyomo.core import value
+from pyomo.core.expr import InequalityExpression, RangedExpression, EqualityExpression
+from pyomo.common.numeric_types import native_numeric_types
+
+from pyomo_fesd.errors import FesdError
+
+
+class Side(NamedTuple):
+    """One argument of a condition: ``lower <= body <= upper``, None for no bound."""
+
+    lower: object
+    body: object
+    upper: object
+
+
+class Pair(NamedTuple):
+    """``0 <= G perp H >= 0`` (theory, eq. 14)."""
+
+    G: object
+    H: object
+
+
+class Mixed(NamedTuple):
+    """``lower <= body <= upper  perp  F``: F >= 0 at the lower bound, F <= 0 at the upper, F = 0 between."""
+
+    lower: object
+    body: object
+    upper: object
+    F: object
+
+
+def _is_constant(expr):
+    return expr.__class__ in native_numeric_types or not expr.is_potentially_variable()
+
+
+def _difference(a, b):
+    """``a - b`` without a trailing ``- 0``."""
+    return a if _is_constant(b) and value(b) == 0 else a - b
+
+
+def side(arg):
+    """Read one argument of ``complements``.
+
+    A relational expression gives its own bounds; a bare variable gives the bounds that it was declared with, so that
+    ``complements(x, y)`` of two non-negative variables means what it says.
+    """
+    if arg.__class__ in native_numeric_types:
+        return Side(None, arg, None)
+    if isinstance(arg, RangedExpression):
+        return Side(*arg.args)
+    if isinstance(arg, InequalityExpression):
+        low, high = arg.args
+        if _is_constant(low):
+            return Side(low, high, None)
+        if _is_constant(high):
+            return Side(None, low, high)
+        return Side(0, high - low, None)
+    if isinstance(arg, EqualityExpression):
+        return Side(0, arg.args[0] - arg.args[1], 0)
+    if arg.is_variable_type():
+        return Side(arg.lower, arg, arg.upper)
+    return Side(None, arg, None)
+
+
+def _gap(s):
+    """The non-negative distance of a side to its only bound."""
+    return _difference(s.body, s.lower) if s.upper is None else _difference(s.upper, s.body)
+
+
+def read(data):
+    """The meaning of one ComplementarityData.
+
+    Returns
+    -------
+    Pair or Mixed
+
+    Raises
+    ------
+    FesdError
+        for an empty condition, an equality as a side, or sides that do not have two finite bounds between them (counting, for
+        a bare variable, its declared bounds).
+    """
+    args = getattr(data, '_args', None)
+    if args is None:
+        raise FesdError(data, "this complementarity condition is empty", "give it a rule, or delete the index")
+    sides = [side(a) for a in args]
+    for s, arg in zip(sides, args):
+        if isinstance(arg, EqualityExpression):
+            raise FesdError(data, f"one side is an equality, '{arg}'", "write the equality as a Constraint of its own")
+    # a side of two variables' making: prefer the bounds that the condition itself states over declared ones
+    stated = [isinstance(a, (InequalityExpression, RangedExpression)) for a in args]
+    counts = [(s.lower is not None) + (s.upper is not None) for s in sides]
+    if counts == [1, 1]:
+        return Pair(_gap(sides[0]), _gap(sides[1]))
+    for i, j in ((0, 1), (1, 0)):
+        if counts[i] == 2 and not (stated[j] and counts[j]):
+            return Mixed(sides[i].lower, sides[i].body, sides[i].upper, sides[j].body)
+        if counts[i] == 1 and counts[j] == 0:
+            # one-sided mixed condition: the free side takes the sign that the bound gives it
+            F = sides[j].body
+            return Pair(_gap(sides[i]), F if sides[i].upper is None else -F)
+        if counts[i] == 1 and counts[j] == 2 and stated[i]:
+            # a bound stated on one side, a variable with two declared bounds on the other: only its lower bound can be meant
+            return Pair(_gap(sides[i]), _difference(sides[j].body, sides[j].lower))
+    raise FesdError(
+        data,
+        f"the two sides '{args[0]}' and '{args[1]}' have {sum(counts)} finite bounds between them, two are needed",
+        "write complements(G >= 0, H >= 0), or give the bare variables their bounds",
+    )

@@ -1,0 +1,1 @@
+"""Disjunctions over time become a dynamic complementarity system (theory, section 1)."""

@@ -1,0 +1,261 @@
+"""Mode equations, brought to the explicit form v = f_i before they are blended (theory, eq. 7).
+
+Blending residuals that carry different factors of v would change the sliding solution.  So every mode's equations are solved
+for the variables that all modes define: the derivatives that appear, then the algebraic variables that make the system
+solvable in every mode.  Where a variable cannot be isolated with a constant factor, the mode gets its own copy of it.
+"""
+
+import itertools
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.core import value
+from pyomo.core.expr.compare import compare_expressions
+from pyomo.core.expr.visitor import identify_variables
+from pyomo.repn import generate_standard_repn
+
+from pyomo_fesd.errors import FesdError
+
+#: With more ways than this to choose the defined variables, only those that stand alone on a side are considered.
+MOST_CHOICES = 5000
+
+
+@dataclass(frozen=True)
+class ModeEquations:
+    """What the modes define.
+
+    Attributes
+    ----------
+    defined : list of VarData
+        the variables v_j, the same for every mode
+    rhs : list of lists
+        ``rhs[i][j]`` is f_i of v_j as an expression; None where mode i has no explicit form
+    equations : list of lists of ConstraintData
+        the equations of each mode, as the user wrote them
+    """
+
+    defined: list
+    rhs: list
+    equations: list
+
+    def shared(self, j):
+        """Whether all modes give v_j the same right-hand side."""
+        first, *others = (f[j] for f in self.rhs)
+        return first is not None and all(f is not None and _same(first, f) for f in others)
+
+
+def _same(a, b):
+    if isinstance(a, (int, float)) and isinstance(b, (int, float)):
+        return a == b
+    return compare_expressions(a, b)
+
+
+@dataclass(frozen=True)
+class _Equation:
+    """``sum coefficient*variable + rest == 0``, with the variables that stand alone on a side."""
+
+    constraint: object
+    linear: ComponentMap
+    rest: object
+    nonlinear: ComponentSet
+    alone: ComponentSet
+
+    def mentions(self, v):
+        return v in self.linear or v in self.nonlinear
+
+
+def read_equations(disjunction, disjuncts, equalities, is_derivative, is_state):
+    """Find the variables that the modes define and solve every mode's equations for them.
+
+    Parameters
+    ----------
+    equalities : list of lists of ConstraintData
+        the equality constraints of each disjunct
+    is_derivative, is_state : callables VarData -> bool
+
+    Raises
+    ------
+    FesdError
+        naming the missing, surplus or ambiguous variable
+    """
+    modes = [[_read(con) for con in cons] for cons in equalities]
+    _require_equal_counts(disjunction, disjuncts, modes, is_derivative)
+    wanted = _derivatives(disjunction, disjuncts, modes, is_derivative)
+    defined = wanted + _algebraic(disjunction, disjuncts, modes, wanted, is_state)
+    rhs = [_solve(equations, defined) for equations in modes]
+    return ModeEquations(defined, rhs, equalities)
+
+
+@contextmanager
+def _all_free(variables):
+    """Treat fixed variables as variables: an initial value fixed at t0 does not change what the equation means."""
+    fixed = [v for v in variables if v.fixed]
+    for v in fixed:
+        v.fixed = False
+    try:
+        yield
+    finally:
+        for v in fixed:
+            v.fixed = True
+
+
+def _read(constraint):
+    body = constraint.body - constraint.upper
+    with _all_free(list(identify_variables(body, include_fixed=True))):
+        repn = generate_standard_repn(body, compute_values=False, quadratic=False)
+    rest = repn.constant if repn.nonlinear_expr is None else repn.constant + repn.nonlinear_expr
+    sides = getattr(constraint.expr, 'args', ())
+    alone = (s for s in sides if getattr(s, 'is_variable_type', lambda: False)())
+    nonlinear = ComponentSet(repn.nonlinear_vars)
+    linear = ComponentMap()
+    for v, c in zip(repn.linear_vars, repn.linear_coefs):
+        if v in nonlinear:
+            rest = rest + c * v
+        else:
+            linear[v] = c
+    return _Equation(constraint, linear, rest, nonlinear, ComponentSet(alone))
+
+
+def _names(variables):
+    return ', '.join(sorted(v.name for v in variables)) or 'none'
+
+
+def _require_equal_counts(disjunction, disjuncts, modes, is_derivative):
+    longest, shortest = max(modes, key=len), min(modes, key=len)
+    if not longest:
+        raise FesdError(
+            disjunction,
+            "no disjunct defines anything: there is no equality constraint in them",
+            "write what each mode defines, e.g. m.dx[t] == ..., beside its region",
+        )
+    if len(longest) == len(shortest):
+        return
+    full, lacking = (disjuncts[next(i for i, m in enumerate(modes) if m is which)] for which in (longest, shortest))
+    candidates = [
+        ComponentSet(v for e in mode for v in e.linear if is_derivative(v) or v in e.alone) for mode in (longest, shortest)
+    ]
+    missing = [v for v in candidates[0] if v not in candidates[1]]
+    raise FesdError(
+        lacking,
+        f"this mode has {len(shortest)} equation(s) where '{full.name}' has {len(longest)}; "
+        f"defined there and not here: {_names(missing)}",
+        "let every disjunct of a Disjunction define the same variables",
+    )
+
+
+def _derivatives(disjunction, disjuncts, modes, is_derivative):
+    """The derivatives that the modes define; each mode must mention each of them."""
+    found = ComponentMap()
+    for equations in modes:
+        for e in equations:
+            for v in itertools.chain(e.linear, e.nonlinear):
+                if is_derivative(v):
+                    found[v] = None
+    for disjunct, equations in zip(disjuncts, modes):
+        for v in found:
+            if not any(e.mentions(v) for e in equations):
+                raise FesdError(
+                    disjunct,
+                    f"this mode does not define '{v.name}', which other modes of '{disjunction.name}' do",
+                    f"add the equation for '{v.name}' (for a frozen state: == 0), or take it out of the other disjuncts",
+                )
+    if len(found) > len(modes[0]):
+        raise FesdError(
+            disjunction,
+            f"{len(modes[0])} equation(s) a mode cannot define {len(found)} derivatives: {_names(found)}",
+            "give every derivative its own equation in every disjunct",
+        )
+    return list(found)
+
+
+def _algebraic(disjunction, disjuncts, modes, derivatives, is_state):
+    """The algebraic variables that make up the rest: those for which every mode's equations can be solved."""
+    number = len(modes[0]) - len(derivatives)
+    if number == 0:
+        return []
+    candidates = ComponentMap()
+    for v in itertools.chain.from_iterable(itertools.chain(e.linear, e.nonlinear) for e in modes[0]):
+        if v not in derivatives and not is_state(v) and all(any(e.mentions(v) for e in eqs) for eqs in modes):
+            candidates[v] = None
+    if comb(len(candidates), number) > MOST_CHOICES:
+        candidates = [v for v in candidates if any(v in e.alone for eqs in modes for e in eqs)]
+    choices = list(itertools.combinations(candidates, number))
+    explicit = [c for c in choices if all(_solvable(eqs, [*derivatives, *c]) for eqs in modes)]
+    implicit = [c for c in choices if all(_matching(eqs, [*derivatives, *c]) for eqs in modes)]
+    for group in (explicit, implicit):
+        if group:
+            return list(_preferred(disjunction, modes, group))
+    raise FesdError(
+        disjunction,
+        "the modes do not define the same variables: no choice of "
+        f"{number} of the variables that all of them mention ({_names(candidates)}) can be solved for in every disjunct",
+        "let every disjunct define the same variables, one equation each",
+    )
+
+
+def _preferred(disjunction, modes, choices):
+    """Among possible choices, the variables that stand alone on a side, as people write what they define."""
+
+    def score(choice):
+        return sum(any(v in e.alone for e in equations) for equations in modes for v in choice)
+
+    best = max(map(score, choices))
+    top = [c for c in choices if score(c) == best]
+    if len(top) > 1:
+        raise FesdError(
+            disjunction,
+            "it cannot be told which variable the mode equations define: " + ' or '.join(_names(c) for c in top),
+            "put the defined variable alone on one side, e.g. m.F[t] == 0.1*(m.P[t] - 1)",
+        )
+    return top[0]
+
+
+def _matrix(equations, defined):
+    return np.array([[value(e.linear.get(v, 0)) for v in defined] for e in equations], dtype=float)
+
+
+def _solvable(equations, defined):
+    """Whether the equations are linear in ``defined`` with a constant, nonsingular matrix."""
+    if any(v in e.nonlinear for e in equations for v in defined):
+        return False
+    A = _matrix(equations, defined)
+    return np.linalg.matrix_rank(A) == len(defined)
+
+
+def _matching(equations, defined):
+    """Whether every equation can be paired with one of the variables (structural nonsingularity)."""
+    return any(
+        all(e.mentions(v) for e, v in zip(equations, order)) for order in itertools.permutations(defined)
+    )
+
+
+def _solve(equations, defined):
+    """f of every defined variable, or None for all of them where the mode has no explicit form."""
+    if not _solvable(equations, defined):
+        return [None] * len(defined)
+    A = _matrix(equations, defined)
+    known = ComponentSet(defined)
+    if np.count_nonzero(A) == len(defined):
+        # one variable an equation: the factor may be a mutable Param, so it stays an expression
+        order = [int(np.flatnonzero(A[:, j])[0]) for j in range(len(defined))]
+        return [_scaled(equations[i], known, equations[i].linear[v]) for i, v in zip(order, defined)]
+    if any(not isinstance(e.linear[v], (int, float)) for e in equations for v in defined if v in e.linear):
+        return [None] * len(defined)
+    inverse = np.linalg.inv(A)
+    rests = [_scaled(e, known, 1) for e in equations]
+    return [sum(float(c) * r for c, r in zip(row, rests) if c) for row in inverse]
+
+
+def _scaled(equation, defined, factor):
+    """``-(everything but the defined variables)/factor``."""
+    terms = [(-c / factor) * v for v, c in equation.linear.items() if v not in defined]
+    rest = equation.rest
+    if isinstance(rest, (int, float)):
+        constant = -rest / factor
+        if not terms:
+            return constant
+        return sum(terms) if isinstance(constant, float) and constant == 0 else sum(terms) + constant
+    return sum(terms) - rest / factor if terms else -rest / factor

@@ -1,0 +1,200 @@
+"""Regions: switching functions and the sign matrix S, read off the inequalities of the disjuncts (theory, eq. 4).
+
+Two inequalities speak of the same switching function when they are proportional, however they are written (``x <= 1``,
+``2 - 2*x >= 0``, ``1 >= x``).  That is decided by their values at a few random points, so any arrangement of any smooth
+expression is recognised; the same values reveal affine dependence (``x`` and ``x - 1``), by which sign patterns that no point
+can have are told from true gaps.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import null_space
+from scipy.optimize import linprog
+from pyomo.core import value
+from pyomo.core.expr.visitor import identify_variables
+
+from pyomo_fesd.errors import FesdError
+
+#: Relative agreement of two functions' values at random points to count as proportional.
+PROPORTIONAL = 1e-9
+#: More switching functions than this in one Disjunction have too many sign patterns to enumerate.
+MOST_FUNCTIONS = 12
+
+
+@dataclass(frozen=True)
+class Regions:
+    """The partition of the state space that the modes of one Disjunction make.
+
+    Attributes
+    ----------
+    functions : list of expressions
+        the switching functions c_k, in the order in which they were met; c_1 >= 0 is the first mode's first condition
+    patterns : list of lists of tuples
+        for each mode the full sign patterns (+1, -1) of its region; one pattern unless the mode leaves signs open
+    """
+
+    functions: list
+    patterns: list
+
+
+def conditions(inequality):
+    """The expressions ``c`` with ``c >= 0`` that an inequality constraint states (two for a ranged one)."""
+    body, found = inequality.body, []
+    if inequality.lower is not None:
+        found.append(body if value(inequality.lower) == 0 else body - inequality.lower)
+    if inequality.upper is not None:
+        found.append(-body if value(inequality.upper) == 0 else inequality.upper - body)
+    return found
+
+
+def read_regions(disjunction, disjuncts, inequalities, cache):
+    """Switching functions and sign patterns of the modes of ``disjunction``.
+
+    Parameters
+    ----------
+    inequalities : list of lists of ConstraintData
+        the inequalities of each disjunct
+    cache : dict
+        patterns found before, by sign matrix; the same Disjunction at another time has the same geometry
+
+    Raises
+    ------
+    FesdError
+        for a disjunct without a condition, and for regions that overlap or leave a gap
+    """
+    stated = [[c for con in cons for c in conditions(con)] for cons in inequalities]
+    for disjunct, cs in zip(disjuncts, stated):
+        if not cs:
+            raise FesdError(
+                disjunct,
+                f"this mode of Disjunction '{disjunction.name}' has no region condition",
+                "add the inequality on the states that holds where the mode is active",
+            )
+    functions, values, S = _sign_matrix(disjuncts, stated)
+    key = S.tobytes()
+    if key not in cache:
+        cache[key] = _patterns(disjunction, disjuncts, functions, values, S)
+    return Regions(functions, cache[key])
+
+
+def _sign_matrix(disjuncts, stated):
+    """Collect the distinct switching functions; S[i, k] = +-1 where mode i needs that sign of c_k, 0 where it does not say."""
+    sampled = _sample([c for cs in stated for c in cs])
+    functions, values, rows = [], [], []
+    for disjunct, cs in zip(disjuncts, stated):
+        row = {}
+        for c in cs:
+            F = next(sampled)
+            k, sign = _find(F, values)
+            if k is None:
+                k, sign = len(functions), 1
+                functions.append(c)
+                values.append(F)
+            if row.setdefault(k, sign) != sign:
+                raise FesdError(
+                    disjunct,
+                    f"the region is empty: it asks for both signs of '{functions[k]}'",
+                    "correct the inequalities of this disjunct",
+                )
+        rows.append(row)
+    S = np.zeros((len(rows), len(functions)), dtype=int)
+    for i, row in enumerate(rows):
+        for k, sign in row.items():
+            S[i, k] = sign
+    return functions, np.array(values), S
+
+
+def _find(F, values):
+    """Index of the function that ``F`` is a multiple of, and the sign of the factor."""
+    for k, known in enumerate(values):
+        factor = F @ known / (known @ known)
+        if factor and np.abs(F - factor * known).max() <= PROPORTIONAL * np.abs(F).max():
+            return k, int(np.sign(factor))
+    return None, None
+
+
+def _sample(expressions):
+    """Yield the values of each expression at the same random points; the variables keep their values."""
+    variables = {id(v): v for e in expressions for v in identify_variables(e, include_fixed=True)}.values()
+    count = len(expressions) + 3
+    kept = [(v, v.value, v.stale) for v in variables]
+    table = np.empty((count, len(expressions)))
+    random, row, tries = np.random.default_rng(1), 0, 0
+    try:
+        while row < count:
+            for v, old, _ in kept:
+                v.set_value((old or 1.0) * random.uniform(0.5, 1.5), skip_validation=True)
+            sample = [value(e, exception=False) for e in expressions]
+            tries += 1
+            if all(s is not None and np.isreal(s) and np.isfinite(s) for s in sample):
+                table[row] = sample
+                row += 1
+            elif tries > 20 * count:
+                raise FesdError(
+                    str(expressions[0]),
+                    "a region condition cannot be evaluated near the initial values of its variables",
+                    "initialise the variables inside the domain of the expression",
+                )
+    finally:
+        for v, old, stale in kept:
+            v.set_value(old, skip_validation=True)
+            v.stale = stale
+    yield from table.T
+
+
+def _patterns(disjunction, disjuncts, functions, values, S):
+    """Full sign patterns of every mode; each pattern that some point can have must belong to exactly one mode."""
+    if len(functions) > MOST_FUNCTIONS:
+        raise FesdError(
+            disjunction,
+            f"{len(functions)} different switching functions give too many sign patterns",
+            "split the Disjunction into independent ones, one for each equipment item that switches",
+        )
+    owned = [[] for _ in disjuncts]
+    possible = _possibility(values)
+    for pattern in itertools.product((1, -1), repeat=len(functions)):
+        owners = [i for i, row in enumerate(S) if all(s in (0, p) for s, p in zip(row, pattern))]
+        if len(owners) == 1:
+            # a mode keeps a pattern that it names in full without asking; an open sign is filled in only if it can occur
+            if np.all(S[owners[0]] != 0) or possible(pattern):
+                owned[owners[0]].append(pattern)
+        elif possible(pattern):
+            where = ' and '.join(f"{c} {'>=' if p > 0 else '<='} 0" for c, p in zip(functions, pattern))
+            names = ', '.join(disjuncts[i].name for i in owners) or 'no disjunct'
+            raise FesdError(
+                disjunction,
+                f"the regions {'overlap' if owners else 'leave a gap'}: where {where}, {names} "
+                f"{'are active at once' if owners else 'is active'}",
+                "make the inequalities of the disjuncts a partition of the state space",
+            )
+    return owned
+
+
+def _possibility(values):
+    """A test whether any point can have given signs of the c_k, from their affine dependence.
+
+    With values F of the functions at more points than functions, every relation ``a'c = b`` that holds at all points shows in
+    the null space of ``[F, -1]``; a pattern is impossible if the linear program with these relations has no interior point.
+    """
+    F = np.asarray(values).T
+    relations = null_space(np.hstack([F, -np.ones((len(F), 1))]), rcond=1e-10).T
+    A, b = relations[:, :-1], relations[:, -1]
+    n = F.shape[1]
+
+    def possible(pattern):
+        if not len(relations):
+            return True
+        # variables: c (n of them) and a margin m <= 1 to be maximised with  pattern_k c_k >= m
+        result = linprog(
+            np.append(np.zeros(n), -1.0),
+            A_ub=np.hstack([-np.diag(pattern), np.ones((n, 1))]),
+            b_ub=np.zeros(n),
+            A_eq=np.hstack([A, np.zeros((len(A), 1))]),
+            b_eq=b,
+            bounds=[(None, None)] * n + [(None, 1.0)],
+        )
+        return result.status == 0 and -result.fun > 1e-9
+
+    return possible

@@ -1,0 +1,63 @@
+"""The minimal form for two modes and one switching function: one multiplier (theory, eq. 5).
+
+    c(x) = p - n,    0 <= 1 - nu  perp  p >= 0,    0 <= nu  perp  n >= 0
+
+with mode 1 where c > 0 and nu its multiplier; p and n are the positive and the negative part of c, continuous in time.
+
+Takes: a ``System`` of two modes that share one switching function.
+Leaves: ``nu``, ``p``, ``n``, ``switching`` (c = p - n), ``complementarity`` (index 1 and 2: the modes), ``mode`` (eq. 7).
+Does not apply: more than two modes, or a region of more than one condition.
+"""
+
+from pyomo.core import Constraint, Var
+from pyomo.core import value
+from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd import marks
+
+NAME = 'two_mode'
+
+
+def applies(system):
+    """Two modes on the two sides of one switching function."""
+    return len(system.modes) == 2 and len(system.regions.functions) == 1
+
+
+def size(system):
+    """Regions that the form distinguishes, part of its block's name."""
+    return 2
+
+
+def declare(block, index):
+    """Declare the components of the form over ``index`` (a tuple of sets, empty for a scalar Disjunction)."""
+    block.nu = Var(*index, dense=False, bounds=(0, 1))
+    block.p = Var(*index, dense=False, bounds=(0, None))
+    block.n = Var(*index, dense=False, bounds=(0, None))
+    block.switching = Constraint(*index)
+    block.complementarity = Complementarity(*index, [1, 2])
+    marks.mark(block, marks.SELECTOR, block.nu)
+    for part in (block.p, block.n):
+        marks.mark(block, marks.CONTINUOUS, part)
+
+
+def add(block, index, system):
+    """Add one time of one Disjunction.
+
+    Parameters
+    ----------
+    index : tuple
+
+    Returns
+    -------
+    list of expressions
+        the weight of each mode, nu and 1 - nu
+    """
+    nu, p, n = (getattr(block, name)[index or None] for name in ('nu', 'p', 'n'))
+    (c,), (pattern, *_), *_ = system.regions.functions, system.regions.patterns[0]
+    c = c if pattern[0] > 0 else -c
+    now = value(c, exception=False) or 0.0
+    nu.value, p.value, n.value = 0.5, max(now, 0.0), max(-now, 0.0)
+    block.switching.add(index or None, c == p - n)
+    block.complementarity.add((*index, 1), complements(nu >= 0, n >= 0))
+    block.complementarity.add((*index, 2), complements(1 - nu >= 0, p >= 0))
+    return [nu, 1 - nu]

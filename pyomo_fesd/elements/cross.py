@@ -1,0 +1,202 @@
+"""Cross complementarity: an active set that does not change inside an element (theory, eq. 11).
+
+Takes: the active Complementarities over time, whoever wrote them.
+Leaves: ``cross`` (aggregated pairs by family and element), ``nonnegative`` (signs of sides that bounds do not imply),
+``left_limit`` (Gauss only); the sources are switched off, except at the first time, where they hold as they are.
+Does not apply: to complementarities without time.
+"""
+
+from dataclasses import dataclass
+
+from pyomo.common.autoslots import AutoSlots
+from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
+from pyomo.core import Block, Constraint, ConstraintList, RangeSet, Set, quicksum
+from pyomo.core.expr.visitor import identify_variables
+from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd import marks
+from pyomo_fesd.complementarity import Mixed, read
+from pyomo_fesd.errors import FesdError
+from pyomo_fesd.timeindex import TimeIndex, derivatives, strip_time
+
+#: The three forms of eq. (11), with the number of point indices of each pair.
+FORMS = {'element': 0, 'stage': 1, 'full': 2}
+
+
+class _Sources(AutoSlots.Mixin):
+    """Private data of the block of a moving grid: the conditions that each aggregated pair stands for."""
+
+    __slots__ = ('conditions',)
+
+    def __init__(self):
+        self.conditions = ComponentMap()
+
+
+Block.register_private_data_initializer(_Sources, scope='pyomo_fesd.elements')
+
+
+def sources(block):
+    """ComponentMap from the aggregated pairs on ``block`` to lists of the conditions that they stand for."""
+    return block.private_data('pyomo_fesd.elements').conditions
+
+
+@dataclass(frozen=True)
+class Family:
+    """One complementarity condition over time.
+
+    Attributes
+    ----------
+    name : str
+    conditions : dict label -> ComplementarityData
+    sides : dict label -> Pair
+        jumping side first: the selector nu of eq. (11), then lam
+    continuous : tuple of bool
+        for each side, whether it is continuous in time and so enters with its boundary values too
+    """
+
+    name: str
+    conditions: dict
+    sides: dict
+    continuous: tuple
+
+    def points(self, element):
+        """Stage labels of ``element`` at which the condition exists."""
+        return [t for t in element.points if t in self.sides]
+
+    def values(self, element, side, right_is_stage):
+        """Side 0 or 1 at the labels that take part in ``element``: its stages, and its boundaries if it is continuous."""
+        labels = self.points(element)
+        if self.continuous[side]:
+            boundaries = (element.left,) if right_is_stage else (element.left, element.right)
+            labels = labels + [t for t in boundaries if t in self.sides]
+        return [self.sides[t][side] for t in labels]
+
+
+def read_families(block, wrt, grid):
+    """The complementarities over ``wrt`` on ``block``, by family.
+
+    Raises
+    ------
+    FesdError
+        for conditions with two bounds on one side (mixed complementarity) over time
+    """
+    times = TimeIndex(wrt)
+    continuous = _continuous_variables(block.model(), wrt)
+    datas = block.component_data_objects(Complementarity, active=True, descend_into=Block)
+    families = []
+    for name, conditions in times.families(datas).items():
+        sides = {t: read(c) for t, c in conditions.items()}
+        mixed = next((c for t, c in conditions.items() if isinstance(sides[t], Mixed)), None)
+        if mixed is not None:
+            raise FesdError(
+                mixed,
+                "a complementarity over time with two bounds on one side is not supported yet",
+                "write it as two conditions: l <= x perp F+ and x <= u perp F-, with F = F+ - F-",
+            )
+        inner = next((t for t in sides if t != wrt.first()), None)
+        smooth = tuple(_is_continuous(s, continuous) for s in sides[inner]) if inner is not None else (False, False)
+        if smooth == (True, False):
+            sides, smooth = {t: (H, G) for t, (G, H) in sides.items()}, (False, True)
+        families.append(Family(_public_name(name), conditions, sides, smooth))
+    return families
+
+
+def _public_name(name):
+    """A family's name as shown in reports: without time and without the package's own blocks."""
+    name = strip_time(name)
+    return '.'.join(part for part in name.split('.') if not part.startswith(marks.GENERATED))
+
+
+def _continuous_variables(model, wrt):
+    """Differential states, and variables that are marked as continuous."""
+    found = ComponentSet(d.get_state_var() for d in derivatives(model, wrt))
+    found.update(component for component, _ in marks.marked(model, marks.CONTINUOUS))
+    return found
+
+
+def _is_continuous(expr, continuous):
+    variables = list(identify_variables(expr, include_fixed=True)) if hasattr(expr, 'is_expression_type') else []
+    return bool(variables) and all(v in continuous or v.parent_component() in continuous for v in variables)
+
+
+def add_cross_complementarity(block, families, grid, wrt, form):
+    """Put the aggregated pairs on ``block`` and switch the sources off."""
+    block.family = Set(initialize=[f.name for f in families], ordered=True)
+    stages = RangeSet(len(grid.tau))
+    labels = RangeSet(len(grid.tau) + 2)
+    block.cross = Complementarity(block.family, block.element, *(stages, labels)[: FORMS[form]])
+    for family in families:
+        for element in grid.elements:
+            for index, (G, H) in _pairs(family, element, grid.right_is_stage, form):
+                pair = block.cross.add((family.name, element.n, *index), complements(G >= 0, H >= 0))
+                sources(block)[pair] = [family.conditions[t] for t in family.points(element)]
+    _add_signs(block, families)
+    if not grid.right_is_stage:
+        _hold_left_limits(block, families, grid, wrt)
+    for family in families:
+        for t, condition in family.conditions.items():
+            if t != wrt.first():
+                condition.deactivate()
+
+
+def _pairs(family, element, right_is_stage, form):
+    """The pairs of eq. (11) for one family and element, with their point indices."""
+    if not family.points(element):
+        return
+    G = family.values(element, 0, right_is_stage)
+    H = family.values(element, 1, right_is_stage)
+    if form == 'element':
+        yield (), (quicksum(G), quicksum(H))
+    elif form == 'stage':
+        for r, G_r in enumerate(G, start=1):
+            yield (r,), (G_r, quicksum(H))
+    else:
+        for r, G_r in enumerate(G, start=1):
+            for s, H_s in enumerate(H, start=1):
+                yield (r, s), (G_r, H_s)
+
+
+def _add_signs(block, families):
+    """G >= 0 and H >= 0 at every point, where the bounds of the variables do not say so already."""
+    block.nonnegative = ConstraintList()
+    lower = ExpressionBoundsVisitor()
+    for family in families:
+        for t, pair in family.sides.items():
+            for expr in pair:
+                low = expr.lb if expr.is_variable_type() else lower.walk_expression(expr)[0]
+                if low is None or low < 0:
+                    block.nonnegative.add(expr >= 0)
+
+
+def _hold_left_limits(block, families, grid, wrt):
+    """Gauss: the copies of nu at element boundaries belong to no stage; they keep the value of the last stage before.
+
+    Without this they would be free, and an objective at the final time could exploit it.
+    """
+    block.left_limit = ConstraintList()
+    selectors = ComponentSet(c for c, _ in marks.marked(block.model(), marks.SELECTOR))
+    held = ComponentSet()
+    for family in families:
+        if family.continuous[0]:
+            continue
+        for element in grid.elements:
+            if element.right in family.sides and family.points(element):
+                _hold(block, family, element, selectors, held)
+
+
+def _hold(block, family, element, selectors, held):
+    right, last = family.sides[element.right][0], family.sides[family.points(element)[-1]][0]
+    own = [(v, w) for v, w in zip(identify_variables(right), identify_variables(last))]
+    chosen = [(v, w) for v, w in own if v in selectors or v.parent_component() in selectors]
+    for v, w in chosen:
+        if v not in held:
+            held.add(v)
+            block.left_limit.add(v == w)
+    if not chosen and not any(v in held for v, _ in own):
+        if not _generated(own):
+            block.left_limit.add(right == last)
+
+
+def _generated(variables):
+    return any(marks.is_generated(v) for v, _ in variables)

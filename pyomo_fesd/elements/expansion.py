@@ -1,0 +1,160 @@
+"""pyomo.dae's discretisation, made to expand hybrid components too, and undone if it fails.
+
+``dae.collocation`` raises on a Disjunct, Disjunction or Complementarity over time (Pyomo issue #3101) and leaves the model half
+expanded.  Here they take part: while pyomo.dae works, Disjuncts and Complementarities pass as Blocks (which expand by their
+rule), Disjunctions step aside and get their new indices by their rule afterwards.
+"""
+
+import logging
+from contextlib import contextmanager
+
+from pyomo.common.collections import ComponentMap
+from pyomo.common.log import LoggingIntercept
+from pyomo.core import (
+    Block,
+    BooleanVar,
+    Constraint,
+    Expression,
+    LogicalConstraint,
+    Objective,
+    Param,
+    Piecewise,
+    SOSConstraint,
+    Set,
+    Suffix,
+    TransformationFactory,
+    Var,
+)
+from pyomo.core.base.misc import apply_indexed_rule
+from pyomo.dae import ContinuousSet, DerivativeVar, Integral
+from pyomo.gdp import Disjunct, Disjunction
+from pyomo.mpec import Complementarity
+
+from pyomo_fesd.errors import FesdError
+from pyomo_fesd.marks import is_generated
+from pyomo_fesd.timeindex import is_indexed_by
+
+#: Types over time that pyomo.dae expands itself, or rightly leaves alone.
+NATIVE = (Var, Constraint, Expression, Block, DerivativeVar, Param, Suffix, Integral, Piecewise, ContinuousSet)
+#: Types over time that are treated here.
+HYBRID = (Disjunct, Disjunction, Complementarity)
+#: Types over time that cannot be expanded, and what to do instead.
+REFUSED = {
+    Objective: "write one Objective, e.g. with a pyomo.dae.Integral",
+    SOSConstraint: "put it in a Block over time, or declare it after the discretisation",
+    LogicalConstraint: "let the state decide the mode, by the regions of a Disjunction",
+    BooleanVar: "let the state decide the mode, by the regions of a Disjunction",
+    Set: "use a Set that does not depend on time",
+}
+PLACES = (Block, Disjunct)
+
+
+def discretise(block, wrt, nfe, ncp, scheme):
+    """Put ``nfe`` elements of ``ncp`` points on ``wrt`` and expand everything over it; the same number in each stage.
+
+    Raises
+    ------
+    FesdError
+        for components over time that cannot be expanded; the model is then as it was.
+    """
+    _check(block, wrt)
+    with restored_on_error(block, wrt):
+        place_boundaries(wrt, nfe)
+        with hybrid_expansion(block, wrt):
+            TransformationFactory('dae.collocation').apply_to(block, wrt=wrt, nfe=nfe, ncp=ncp, scheme=scheme)
+
+
+def place_boundaries(wrt, nfe):
+    """Divide each control stage (gap between the present points) into the same number of elements."""
+    stages = list(wrt)
+    each = nfe // (len(stages) - 1)
+    for left, right in zip(stages, stages[1:]):
+        for k in range(1, each):
+            wrt.add(round(left + k * (right - left) / each, 6))
+    wrt._fe = list(wrt)
+    wrt.set_changed(True)
+
+
+def _check(block, wrt):
+    for component in block.component_objects(descend_into=PLACES):
+        if not is_indexed_by(component, wrt) or is_generated(component):
+            continue
+        if component.ctype in HYBRID:
+            rule = component._init_rule if component.ctype is not Disjunct else component._rule
+            if rule is None and len(component):
+                raise FesdError(
+                    component,
+                    f"this {component.ctype.__name__} over time was filled by hand: it has no rule for new times",
+                    "declare it with a rule, e.g. @m.Disjunct(m.t)",
+                )
+        elif component.ctype not in NATIVE and not isinstance(component, Var):
+            raise FesdError(
+                component,
+                f"a {component.ctype.__name__} over time cannot be discretised",
+                REFUSED.get(component.ctype, "put it in a Block over time, or declare it after the discretisation"),
+            )
+
+
+@contextmanager
+def hybrid_expansion(block, wrt):
+    """While this lasts, pyomo.dae's discretisation of ``wrt`` expands Disjuncts, Disjunctions and Complementarities."""
+    hybrid = [c for c in block.component_objects(HYBRID, descend_into=PLACES) if c.parent_component() is c]
+    aside = [c for c in hybrid if c.ctype is Disjunction or is_generated(c) or not c.index_set().isfinite()]
+    blocks = [(c, c.ctype) for c in hybrid if c not in ComponentMap((a, 1) for a in aside)]
+    homes = [(c, c.parent_block()) for c in aside]
+    for component, home in homes:
+        home.del_component(component)
+    for component, _ in blocks:
+        component.parent_block().reclassify_component_type(component, Block)
+    try:
+        with LoggingIntercept(None, 'pyomo.dae', logging.WARNING):
+            yield
+    finally:
+        for component, ctype in blocks:
+            component.parent_block().reclassify_component_type(component, ctype)
+        for component, home in homes:
+            home.add_component(component.local_name, component)
+    for component, home in homes:
+        if component.ctype is Disjunction and is_indexed_by(component, wrt):
+            _expand_disjunction(component, home)
+
+
+def _expand_disjunction(disjunction, home):
+    """Give a Disjunction its missing indices by its own rule."""
+    for index in disjunction.index_set():
+        if index not in disjunction._data:
+            disjuncts = apply_indexed_rule(disjunction, disjunction._init_rule, home, index)
+            if disjuncts is not Disjunction.Skip:
+                disjunction[index] = disjuncts
+
+
+@contextmanager
+def restored_on_error(block, wrt):
+    """Take back points, indices and components added to ``block`` if an error comes out of the body."""
+    points, boundaries, info = list(wrt), list(wrt._fe), dict(wrt._discretization_info)
+    names = ComponentMap((b, set(b.component_map())) for b in block.block_data_objects(descend_into=PLACES))
+    indices = ComponentMap((c, set(c._data)) for c in block.component_objects(descend_into=PLACES) if c.is_indexed())
+    derivatives = [c for c in block.component_objects(DerivativeVar, descend_into=PLACES)]
+    expressions = [d.get_derivative_expression() for d in derivatives]
+    try:
+        yield
+    except Exception:
+        for b, known in names.items():
+            for name in set(b.component_map()) - known:
+                b.del_component(name)
+        for component, known in indices.items():
+            for index in set(component._data) - known:
+                del component._data[index]
+            component.__dict__.pop('_dae_missing_idx', None)
+        for derivative, expression in zip(derivatives, expressions):
+            derivative.set_derivative_expression(expression)
+            if derivative.ctype is not DerivativeVar:
+                derivative.parent_block().reclassify_component_type(derivative, DerivativeVar)
+        block.__dict__.pop('_pyomo_dae_reclassified_derivativevars', None)
+        for point in set(wrt) - set(points):
+            wrt.remove(point)
+        wrt._fe = boundaries
+        wrt.set_changed(False)
+        wrt._discretization_info.clear()
+        wrt._discretization_info.update(info)
+        raise

@@ -1,0 +1,62 @@
+"""Element lengths as variables (theory, eq. 9 and 10).
+
+With pyomo.dae's equations the whole of (9) is: replace xdot by r_n xdot in the discretisation equation of element n, with the
+dimensionless multiplier r_n = h_n/hbar_n (hbar_n the nominal length); a k-th derivative gets r_n**k.  The names of the
+discretisation equations stay, as other tools look them up.
+"""
+
+from pyomo.core import Constraint, RangeSet, Set, Var
+from pyomo.core.expr.visitor import replace_expressions
+
+from pyomo_fesd.timeindex import TimeIndex, derivatives
+
+
+def add_lengths(block, grid, gamma):
+    """Declare r_n and the length of every control stage.
+
+    Leaves ``block.element`` (1..N), ``block.stage``, ``block.r`` with (1 - gamma) <= r_n <= (1 + gamma), and
+    ``block.stage_length``: sum_n hbar_n r_n = nominal length of the stage (eq. 10).  A stage of one element has no freedom.
+    """
+    block.element = RangeSet(len(grid.elements))
+    block.stage = Set(initialize=list(grid.stages), ordered=True)
+    block.r = Var(block.element, bounds=(1 - gamma, 1 + gamma), initialize=1)
+
+    @block.Constraint(block.stage)
+    def stage_length(b, stage):
+        elements = grid.stages[stage]
+        if len(elements) == 1:
+            b.r[elements[0].n].fix(1)
+            return Constraint.Skip
+        total = elements[-1].right - elements[0].left
+        return sum(e.length * b.r[e.n] for e in elements) == total
+
+
+def discretisation_equations(model, wrt):
+    """``(derivative, order, its discretisation equations)`` for every DerivativeVar with respect to ``wrt``."""
+    for derivative in derivatives(model, wrt):
+        order = sum(1 for s in derivative.get_continuousset_list() if s is wrt)
+        equations = derivative.parent_block().component(derivative.local_name + '_disc_eq')
+        if equations is not None:
+            yield derivative, order, equations
+
+
+def multiply_derivatives(model, wrt, block, grid):
+    """Write r_n**k in front of the derivative in every discretisation equation."""
+    owner = grid.element_of()
+    times = TimeIndex(wrt)
+    for derivative, order, equations in discretisation_equations(model, wrt):
+        for index, equation in equations.items():
+            r = block.r[owner[times.time(equation)].n]
+            xdot = derivative[index]
+            scaled = r * xdot if order == 1 else r**order * xdot
+            left, right = equation.expr.args
+            if left is xdot:
+                equation.set_value(scaled == right)
+            else:
+                # IDAES and others rescale the equation before: put the factor wherever the derivative stands
+                equation.set_value(replace_expressions(equation.expr, {id(xdot): scaled}))
+
+
+def element_length(block, element):
+    """h_n as an expression, in labels of the ContinuousSet."""
+    return element.length * block.r[element.n]

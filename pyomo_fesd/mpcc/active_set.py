@@ -1,0 +1,43 @@
+"""Which side of each pair is zero (theory, eq. 16)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Sides of a pair, as an assignment names the one that is zero.
+G_ZERO, H_ZERO = 0, 1
+
+
+@dataclass(frozen=True)
+class ActiveSets:
+    """I_alpha, I_beta, I_gamma at a point.
+
+    Attributes
+    ----------
+    zero : int array (q)
+        the smaller side of each pair, ``G_ZERO`` or ``H_ZERO``
+    gamma : bool array (q)
+        pairs whose both sides are zero within the tolerance
+    """
+
+    zero: np.ndarray
+    gamma: np.ndarray
+
+    @property
+    def alpha(self):
+        """Pairs with G = 0 < H."""
+        return (self.zero == G_ZERO) & ~self.gamma
+
+    @property
+    def beta(self):
+        """Pairs with H = 0 < G."""
+        return (self.zero == H_ZERO) & ~self.gamma
+
+    def same_sides(self, other):
+        """Whether the same side is zero in every pair."""
+        return other is not None and np.array_equal(self.zero, other.zero)
+
+
+def active_sets(G, H, tolerance):
+    """Active sets of sides with values ``G`` and ``H``; ``tolerance`` is O(sqrt(eps)) at a solution of Reg(eps)."""
+    return ActiveSets(np.where(G <= H, G_ZERO, H_ZERO), np.maximum(G, H) <= tolerance)

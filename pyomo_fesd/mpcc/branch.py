@@ -1,0 +1,102 @@
+"""Branch NLP: one side of every pair fixed to zero (theory, section 4).
+
+Its solution is exactly complementary, so accuracy is limited by the discretisation and not by eps.  Decided pairs (eq. 13) are
+imposed as equations where their eta is positive.
+
+Takes: a compiled MPCC and an assignment.
+Leaves: an NLP built once; an assignment only changes bounds.
+Does not apply: where the bounds of an assignment contradict each other; ``solve`` then returns None.
+"""
+
+import casadi as ca
+import numpy as np
+
+from pyomo_fesd.mpcc.nlp import Nlp
+
+#: A row without free variables may miss its bounds by this much.
+ROW_TOLERANCE = 1e-8
+
+
+class Branch:
+    """All branch NLPs of one MPCC.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    sides : Sides
+    options : dict
+        Ipopt options
+    """
+
+    def __init__(self, compiled, sides, options, deadline):
+        c = compiled
+        self._c, self._sides = c, sides
+        weight = ca.SX.sym('weight')
+        g = ca.vertcat(c.g, sides.rows, c.equal)
+        self._pattern = _csr_pattern(ca.jacobian(g, c.x))
+        self._values = ca.Function('rows', [c.x], [g])
+        self._nlp = Nlp('branch', c.x, weight, c.f + weight * c.penalty, g, options, deadline)
+
+    def solve(self, w, zero, equal=None, weight=0.0):
+        """Solve the branch ``zero`` from ``w``.
+
+        Parameters
+        ----------
+        zero : int array (q)
+            ``G_ZERO`` or ``H_ZERO`` for each pair
+        equal : bool array (decisions) or None
+            decisions to impose
+        weight : float
+            1 to keep the penalty terms in the objective, 0 to leave them out
+
+        Returns
+        -------
+        NlpResult, or None if the assignment contradicts the bounds
+        """
+        bounds = self._bounds(zero)
+        if bounds is None:
+            return None
+        lbx, ubx = bounds
+        lbg, ubg = self._row_bounds(zero, equal)
+        w = np.clip(w, lbx, ubx)
+        if not self._drop_settled_rows(w, lbx == ubx, lbg, ubg):
+            return None
+        return self._nlp.solve(w, [weight], lbx, ubx, lbg, ubg)
+
+    def _bounds(self, zero):
+        c, sides = self._c, self._sides
+        by_bounds = sides.zero_rows(zero) & (sides.row_of < 0)
+        fixed = sides.fixings[np.flatnonzero(by_bounds)]
+        lower = np.unique(fixed.indices[fixed.data == 1])
+        upper = np.unique(fixed.indices[fixed.data == 2])
+        lbx, ubx = c.lbx.copy(), c.ubx.copy()
+        ubx[lower] = c.lbx[lower]
+        lbx[upper] = c.ubx[upper]
+        return None if np.any(lbx > ubx) else (lbx, ubx)
+
+    def _row_bounds(self, zero, equal):
+        c, sides = self._c, self._sides
+        own = sides.row_of >= 0
+        upper = np.full(np.count_nonzero(own), np.inf)
+        upper[sides.row_of[own & sides.zero_rows(zero)]] = 0.0
+        equal = np.zeros(c.equal.numel(), dtype=bool) if equal is None else equal
+        free = np.where(equal, 0.0, np.inf)
+        lbg = np.concatenate([c.lbg, np.zeros(len(upper)), -free])
+        return lbg, np.concatenate([c.ubg, upper, free])
+
+    def _drop_settled_rows(self, w, fixed, lbg, ubg):
+        """Free the rows whose variables are all fixed; False if one of them is violated."""
+        settled = (self._pattern @ (~fixed).astype(float)) == 0
+        if settled.any():
+            g = np.asarray(self._values(w), dtype=float).ravel()[settled]
+            if np.any(g < lbg[settled] - ROW_TOLERANCE) or np.any(g > ubg[settled] + ROW_TOLERANCE):
+                return False
+            lbg[settled], ubg[settled] = -np.inf, np.inf
+        return True
+
+
+def _csr_pattern(J):
+    from scipy import sparse
+
+    colptr, row = np.array(J.sparsity().colind()), np.array(J.sparsity().row())
+    return sparse.csc_matrix((np.ones(len(row)), row, colptr), shape=J.shape).tocsr()

@@ -1,0 +1,320 @@
+"""The hybrid active-set algorithm (theory, section 4): Reg(eps) -> active sets -> branch NLP -> certificate.
+
+Reg(eps) leads; as soon as its active sets look settled, the branch NLP that they name is solved: an exactly complementary point,
+which the LPEC certifies or from which it descends into a better branch.  The homotopy goes on while its objective lies clearly
+below the incumbent's (gap test), and eps may rise again when a relaxation fails.
+"""
+
+import time
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from pyomo_fesd.mpcc.active_set import active_sets
+from pyomo_fesd.mpcc.branch import Branch
+from pyomo_fesd.mpcc.lpec import Lpec
+from pyomo_fesd.mpcc.relaxation import Relaxation
+from pyomo_fesd.mpcc.sides import sort_sides
+from pyomo_fesd.mpcc.stationarity import Stationarity, certify
+
+#: A branch NLP's objective must fall by this, relative, to count as descent.
+PROGRESS = 1e-8
+
+
+class Outcome(Enum):
+    """How a run ended; the value is the sentence for the user."""
+
+    CERTIFIED = "B-stationary point found and certified"
+    FEASIBLE = "feasible, exactly complementary point found, not certified"
+    INFEASIBLE = "no feasible point found: the problem is locally infeasible"
+    TIME_LIMIT = "time limit reached"
+    ITERATION_LIMIT = "iteration limit reached"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Tolerances of the algorithm; see the options of ``mpec_hybrid`` for their meaning."""
+
+    feasibility: float
+    biactive: float
+    descent: float
+    eta: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the log: an NLP or LPEC with what came out of it."""
+
+    kind: str
+    eps: float
+    f: float
+    violation: float
+    complementarity: float
+    biactive: int
+    iterations: int
+    status: str
+    seconds: float
+
+
+@dataclass
+class Counts:
+    """Work done so far."""
+
+    nlps: int = 0
+    iterations: int = 0
+    lpecs: int = 0
+    binaries: int = 0
+
+
+@dataclass
+class Point:
+    """An exactly complementary point with its certificate."""
+
+    w: np.ndarray
+    f: float
+    zero: np.ndarray
+    equal: np.ndarray
+    certificate: object
+
+
+@dataclass
+class Run:
+    """Everything that a run leaves.
+
+    Attributes
+    ----------
+    outcome : Outcome
+    w : array or None
+        the point to load: the incumbent, or the least infeasible one
+    point : Point or None
+    counts : Counts
+    eps : float
+        the last relaxation parameter
+    steps : list of Step
+    """
+
+    outcome: Outcome = None
+    w: np.ndarray = None
+    point: Point = None
+    counts: Counts = field(default_factory=Counts)
+    eps: float = None
+    steps: list = field(default_factory=list)
+
+
+class _Stop(Exception):
+    """A limit was reached; carries the outcome."""
+
+    def __init__(self, outcome):
+        self.outcome = outcome
+
+
+class HybridSolver:
+    """Runs the algorithm on a compiled MPCC.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    options : ConfigDict
+        of ``mpec_hybrid``
+    timer : HierarchicalTimer
+    show : callable Step -> None
+        called after each NLP and LPEC
+    """
+
+    def __init__(self, compiled, options, timer, show):
+        self._c, self._options, self._timer, self._show = compiled, options, timer, show
+        self._deadline = None if options.time_limit is None else time.perf_counter() + options.time_limit
+        self._tolerances = Tolerances(
+            options.feasibility_tol, options.biactive_tol, options.descent_tol, options.eta_tol, options.trust_radius
+        )
+        ipopt = options.nlp_options.value()
+        timer.start('build')
+        sides = sort_sides(compiled)
+        self._relaxation = Relaxation(compiled, sides, ipopt, self._deadline)
+        budget = {'max_iter': options.branch_iterations, 'tol': options.branch_tol}
+        self._branch = Branch(compiled, sides, budget | ipopt, self._deadline)
+        timer.stop('build')
+        self._lpec = Lpec(compiled, options.lpec_options.value())
+        self._tried = {}
+        self.run = Run()
+
+    def solve(self):
+        """Run to a certified point or an honest end; returns the ``Run``."""
+        run = self.run
+        try:
+            self._homotopy()
+            run.outcome = self._verdict()
+        except _Stop as stop:
+            run.outcome = stop.outcome
+        except KeyboardInterrupt:
+            run.outcome = Outcome.INTERRUPTED
+        if run.point is not None:
+            run.w = run.point.w
+        return run
+
+    def _verdict(self):
+        point = self.run.point
+        if point is None:
+            return Outcome.INFEASIBLE
+        return Outcome.CERTIFIED if point.certificate.certified else Outcome.FEASIBLE
+
+    # the homotopy
+
+    def _homotopy(self):
+        options = self._options
+        w, eps, previous, failures = self._c.x0, options.eps_init, None, 0
+        while True:
+            self.run.eps = eps
+            relaxed = self._relax(w, eps)
+            if not relaxed.solved:
+                failures += 1
+                if failures > options.max_failures:
+                    return
+                # not further down from here: eps up again, from the last good point
+                eps = min(eps / options.eps_factor, options.eps_max)
+                continue
+            w = self.run.w = relaxed.w
+            at = self._c.evaluate(w)
+            sets = active_sets(at.G, at.H, np.sqrt(eps))
+            last = eps <= options.eps_final
+            if sets.same_sides(previous) or last or not sets.gamma.any():
+                self._explore(w, sets)
+                if self._settled(at.f):
+                    return
+            if last:
+                return
+            previous, eps = sets, max(eps * options.eps_factor, options.eps_final)
+
+    def _settled(self, f_relaxed):
+        """Gap test: the incumbent is good enough if the relaxed objective no longer lies clearly below it."""
+        point = self.run.point
+        if point is None or not point.certificate.certified:
+            return False
+        return point.f - f_relaxed <= self._options.gap_tol * max(1.0, abs(point.f))
+
+    # branches
+
+    def _explore(self, w, sets):
+        """Solve the branch that the active sets name; descend from it as long as the LPEC shows a way."""
+        zero = sets.zero
+        if sets.gamma.any() and self._c.has_objective:
+            zero = self._lpec_step(w, sets).zero
+        point = self._point(w, zero)
+        while point is not None:
+            self._keep(point)
+            if point.certificate.grade is not Stationarity.DESCENT:
+                return
+            step = point.certificate.lpec
+            better = self._point(point.w + step.d, step.zero)
+            if better is None or better.f > point.f - PROGRESS * max(1.0, abs(point.f)):
+                return
+            point = better
+
+    def _keep(self, point):
+        """Keep the better of the incumbent and ``point``: certified before uncertified, then the lower objective."""
+        best = self.run.point
+        if best is None or (not point.certificate.certified, point.f) < (not best.certificate.certified, best.f):
+            self.run.point = point
+
+    def _point(self, w, zero):
+        """The solution of branch ``zero``, certified; None if it has none or was tried before."""
+        key = zero.tobytes()
+        if key in self._tried:
+            return None
+        self._tried[key] = True
+        solved, equal = self._solve_branch(w, zero)
+        if solved is None:
+            return None
+        certificate = self._certify(solved.w, equal)
+        if not certificate.feasible:
+            return None
+        return Point(solved.w, self._c.evaluate(solved.w).f, zero, equal, certificate)
+
+    def _solve_branch(self, w, zero):
+        """Two stages where pairs are to be decided (eq. 13): with the penalty to read eta, then with what eta decides."""
+        c = self._c
+        decided = c.eta.numel()
+        first = self._branch_nlp(w, zero, None, weight=1.0)
+        if first is None or not decided:
+            return first, None
+        equal = c.evaluate(first.w).eta > self._tolerances.eta
+        second = self._branch_nlp(first.w, zero, equal, weight=0.0)
+        return second, equal
+
+    # single steps, timed, counted and shown
+
+    def _relax(self, w, eps):
+        return self._nlp('relaxation', eps, lambda: self._relaxation.solve(w, eps))
+
+    def _branch_nlp(self, w, zero, equal, weight):
+        result = self._nlp('branch', 0.0, lambda: self._branch.solve(w, zero, equal, weight))
+        return result if result is not None and result.solved else None
+
+    def _nlp(self, kind, eps, solve):
+        self._check_limits()
+        started = time.perf_counter()
+        self._timer.start(kind)
+        result = solve()
+        self._timer.stop(kind)
+        if result is None:
+            return None
+        counts = self.run.counts
+        counts.nlps += 1
+        counts.iterations += result.iterations
+        self._log(kind, eps, result.w, result.iterations, result.status, started)
+        return result
+
+    def _lpec_step(self, w, sets):
+        self._check_limits()
+        started = time.perf_counter()
+        self._timer.start('lpec')
+        result = self._lpec.solve(w, sets, self._tolerances.radius)
+        self._timer.stop('lpec')
+        self._count_lpec(result)
+        self._log('lpec', 0.0, w, 0, f'{result.value:.1e}', started)
+        return result
+
+    def _certify(self, w, equal):
+        self._check_limits()
+        started = time.perf_counter()
+        self._timer.start('lpec')
+        certificate = certify(self._c, self._lpec, w, self._tolerances, equal)
+        self._timer.stop('lpec')
+        if certificate.lpec is not None:
+            self._count_lpec(certificate.lpec)
+        self._log('certificate', 0.0, w, 0, certificate.grade.name, started)
+        return certificate
+
+    def _count_lpec(self, result):
+        self.run.counts.lpecs += 1
+        self.run.counts.binaries = max(self.run.counts.binaries, result.binaries)
+
+    def _check_limits(self):
+        if self._deadline is not None and time.perf_counter() > self._deadline:
+            raise _Stop(Outcome.TIME_LIMIT)
+        if self.run.counts.iterations >= self._options.max_iterations:
+            raise _Stop(Outcome.ITERATION_LIMIT)
+
+    def _log(self, kind, eps, w, iterations, status, started):
+        c = self._c
+        at = c.evaluate(w)
+        rows, bounds = c.violations(w, at)
+        low = np.minimum(at.G, at.H)
+        violation = max(rows.max(initial=0.0), bounds.max(initial=0.0), -low.min(initial=0.0))
+        biactive = np.count_nonzero(np.maximum(at.G, at.H) <= max(np.sqrt(eps), self._tolerances.biactive))
+        step = Step(
+            kind,
+            eps,
+            c.sign * at.f,
+            float(violation),
+            float(np.abs(low).max(initial=0.0)),
+            biactive,
+            iterations,
+            status,
+            time.perf_counter() - started,
+        )
+        self.run.steps.append(step)
+        self._show(step)

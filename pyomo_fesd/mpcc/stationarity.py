@@ -1,0 +1,108 @@
+"""The certificate: B-stationary means that the LPEC with every bi-active pair as a binary has the value 0 (theory, section 4).
+
+That is: in no branch does a feasible direction descend to first order.  It needs no multipliers, so it also judges points that
+have none.  A point that is only stationary for a relaxation (the origin of the toy MPEC) is refused, with the direction.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from pyomo_fesd.mpcc.active_set import active_sets
+
+
+class Stationarity(Enum):
+    """What is known of the point; the value is the sentence for the user."""
+
+    B = "B-stationary: certified by the LPEC, no branch descends"
+    SQUARE = "feasible, and there is no objective: nothing to descend"
+    DESCENT = "not certified: the LPEC found a direction of descent"
+    UNSOLVED = "not certified: HiGHS did not solve the LPEC"
+    INFEASIBLE = "not certified: the point is not feasible"
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """The verdict on one point.
+
+    Attributes
+    ----------
+    grade : Stationarity
+    value : float
+        of the LPEC, grad f' d for |d| <= Delta
+    lpec : LpecResult or None
+    biactive : int
+        pairs whose both sides are zero
+    violation, complementarity : float
+        largest violation of rows and bounds; largest min(G_i, H_i), negative sides counted
+    violation_scaled, complementarity_scaled : float
+        the same, each row divided by max(1, its gradient's largest entry)
+    """
+
+    grade: Stationarity
+    value: float
+    lpec: object
+    biactive: int
+    violation: float
+    complementarity: float
+    violation_scaled: float
+    complementarity_scaled: float
+
+    @property
+    def certified(self):
+        """Whether the point is B-stationary (or feasible, where there is nothing to minimise)."""
+        return self.grade in (Stationarity.B, Stationarity.SQUARE)
+
+    @property
+    def feasible(self):
+        """Whether rows, bounds and pairs hold."""
+        return self.grade is not Stationarity.INFEASIBLE
+
+
+def certify(c, lpec, w, tolerances, equal=None):
+    """Judge the point ``w`` of a compiled MPCC.
+
+    Parameters
+    ----------
+    lpec : Lpec
+    tolerances : Tolerances
+    equal : bool array or None
+        decisions in force at ``w``; None reads them from eta
+
+    Returns
+    -------
+    Certificate
+    """
+    at = c.evaluate(w)
+    grad, J_g, J_G, J_H, _ = c.gradients(w)
+    rows, bounds = c.violations(w, at)
+    low = np.minimum(at.G, at.H)
+    negative = max(bounds.max(initial=0.0), -low.min(initial=0.0))
+    gap = np.abs(low)
+    violation = max(rows.max(initial=0.0), negative)
+    scaled = max(np.max(rows / _scale(J_g), initial=0.0), negative)
+    gap_scaled = float(np.max(gap / np.minimum(_scale(J_G), _scale(J_H)), initial=0.0))
+    sets = active_sets(at.G, at.H, tolerances.biactive)
+    measures = (int(sets.gamma.sum()), float(violation), float(gap.max(initial=0.0)), float(scaled), gap_scaled)
+    if max(scaled, gap_scaled) > tolerances.feasibility:
+        return Certificate(Stationarity.INFEASIBLE, 0.0, None, *measures)
+    if not grad.any():
+        return Certificate(Stationarity.SQUARE, 0.0, None, *measures)
+    if equal is None:
+        equal = at.eta > tolerances.eta
+    result = lpec.solve(w, sets, tolerances.radius, equal)
+    if not result.solved:
+        grade = Stationarity.UNSOLVED
+    elif result.value >= -tolerances.descent * max(1.0, abs(at.f)):
+        grade = Stationarity.B
+    else:
+        grade = Stationarity.DESCENT
+    return Certificate(grade, result.value, result, *measures)
+
+
+def _scale(J):
+    """max(1, largest entry) of each row."""
+    if J.shape[0] == 0:
+        return np.ones(0)
+    return np.maximum(1.0, np.abs(J).max(axis=1).toarray().ravel())

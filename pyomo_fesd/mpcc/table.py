@@ -1,0 +1,48 @@
+"""The log that ``tee=True`` prints: one aligned line for each NLP and LPEC."""
+
+HEADER = f"{'step':>4}  {'what':<11} {'eps':>8} {'objective':>15} {'violation':>10} {'compl.':>9} {'bi-act.':>7} {'iter':>5} {'time':>7}  status"
+
+
+class Table:
+    """Prints a run to ``streams``.
+
+    Parameters
+    ----------
+    streams : list of text streams
+    compiled : Compiled
+    """
+
+    def __init__(self, streams, compiled):
+        self._streams, self._number = streams, 0
+        c = compiled
+        self._print(
+            f"mpec_hybrid: {len(c.variables)} variables, {len(c.constraints)} constraints, {len(c.conditions)} pairs"
+            + (f", {len(c.decisions)} decided by the branch" if c.decisions else "")
+            + (f"; {c.missing} values were missing and start at 0 or their bound" if c.missing else "")
+        )
+        self._print(HEADER)
+
+    def row(self, step):
+        """Print one step."""
+        self._number += 1
+        eps = f'{step.eps:8.1e}' if step.eps else ' ' * 8
+        self._print(
+            f"{self._number:4d}  {step.kind:<11} {eps} {step.f:15.8e} {step.violation:10.2e} {step.complementarity:9.2e} "
+            f"{step.biactive:7d} {step.iterations:5d} {step.seconds:6.2f}s  {step.status}"
+        )
+
+    def end(self, results):
+        """Print the result."""
+        info = results.extra_info
+        self._print(f"{info.outcome}" + (f" ({info.reason})" if info.reason != info.outcome else ""))
+        objective = results.incumbent_objective
+        self._print(
+            (f"objective {objective:.10g}, " if objective is not None else "")
+            + f"{info.nlps} NLPs with {info.nlp_iterations} iterations, {info.lpecs} LPECs with at most {info.binaries} binaries, "
+            f"{results.timing_info.wall_time:.2f} s"
+        )
+
+    def _print(self, line):
+        for stream in self._streams:
+            stream.write(line + '\n')
+            stream.flush()
