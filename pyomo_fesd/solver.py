@@ -9,7 +9,7 @@ from pyomo.common.collections import ComponentMap
 from pyomo.common.config import (
     ConfigDict,
     ConfigValue,
-    NonNegativeInt,
+    In,
     PositiveFloat,
     PositiveInt,
     document_class_CONFIG,
@@ -30,6 +30,7 @@ from pyomo_fesd.errors import FesdError
 from pyomo_fesd.mpcc.compile import compile_problem
 from pyomo_fesd.mpcc.hybrid import HybridSolver, Outcome, Tolerances
 from pyomo_fesd.mpcc.lpec import Lpec
+from pyomo_fesd.mpcc.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.problem import read_problem
 from pyomo_fesd.mpcc.stationarity import certify as certify_point
 from pyomo_fesd.mpcc.table import Table
@@ -59,8 +60,9 @@ class MpecHybridConfig(SolverConfig):
             ('eps_init', 1.0, PositiveFloat, "first relaxation parameter eps of Reg(eps) (eq. 15)"),
             ('eps_final', 1e-9, PositiveFloat, "smallest eps; the homotopy usually ends earlier, at a certified branch"),
             ('eps_factor', 0.1, PositiveFloat, "eps is multiplied by this after each relaxation (1/Q)"),
-            ('eps_max', 100.0, PositiveFloat, "largest eps to which it may rise when a relaxation fails"),
-            ('max_failures', 5, NonNegativeInt, "failed relaxations before the problem is called infeasible"),
+            ('relaxation', 'elastic', In(list(RELAXATIONS)), "form of Reg(eps): 'elastic' (one slack, weight 1/eps) or 'scholtes'"),
+            ('relaxation_tol', 1e-6, PositiveFloat, "Ipopt's tol for relaxations, which only lead to a branch"),
+            ('relaxation_iterations', 500, PositiveInt, "Ipopt iterations allowed to one relaxation"),
             ('gap_tol', 1e-3, PositiveFloat, "gap test: relative distance of the incumbent to the relaxed objective that ends the run"),
             ('feasibility_tol', 1e-6, PositiveFloat, "largest scaled violation and complementarity of a reported point"),
             ('biactive_tol', 1e-6, PositiveFloat, "sides below this are both zero at a branch solution (eq. 16)"),

@@ -14,12 +14,14 @@ import numpy as np
 from pyomo_fesd.mpcc.active_set import active_sets
 from pyomo_fesd.mpcc.branch import Branch
 from pyomo_fesd.mpcc.lpec import Lpec
-from pyomo_fesd.mpcc.relaxation import Relaxation
+from pyomo_fesd.mpcc.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.sides import sort_sides
 from pyomo_fesd.mpcc.stationarity import Stationarity, certify
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
+#: After a failed relaxation: eps relative to its first value, and whether to start again from the model's values.
+RECOVERY = ((1e-2, True), (10.0, False), (1e-4, True), (100.0, True))
 
 
 class Outcome(Enum):
@@ -133,7 +135,8 @@ class HybridSolver:
         ipopt = options.nlp_options.value()
         timer.start('build')
         sides = sort_sides(compiled)
-        self._relaxation = Relaxation(compiled, sides, ipopt, self._deadline)
+        budget = {'max_iter': options.relaxation_iterations, 'tol': options.relaxation_tol}
+        self._relaxation = RELAXATIONS[options.relaxation](compiled, sides, budget | ipopt, self._deadline)
         budget = {'max_iter': options.branch_iterations, 'tol': options.branch_tol}
         self._branch = Branch(compiled, sides, budget | ipopt, self._deadline)
         timer.stop('build')
@@ -169,16 +172,16 @@ class HybridSolver:
         while True:
             self.run.eps = eps
             relaxed = self._relax(w, eps)
-            if not relaxed.solved:
-                failures += 1
-                if failures > options.max_failures:
+            if not self._usable(relaxed):
+                if failures == len(RECOVERY):
                     return
-                # not further down from here: eps up again, from the last good point
-                eps = min(eps / options.eps_factor, options.eps_max)
+                factor, restart = RECOVERY[failures]
+                w = self._c.x0 if restart else relaxed.w
+                eps, failures, previous = options.eps_init * factor, failures + 1, None
                 continue
             w = self.run.w = relaxed.w
             at = self._c.evaluate(w)
-            sets = active_sets(at.G, at.H, np.sqrt(eps))
+            sets = active_sets(at.G, at.H, self._biactive(at))
             last = eps <= options.eps_final
             if sets.same_sides(previous) or last or not sets.gamma.any():
                 self._explore(w, sets)
@@ -187,6 +190,17 @@ class HybridSolver:
             if last:
                 return
             previous, eps = sets, max(eps * options.eps_factor, options.eps_final)
+
+    def _usable(self, relaxed):
+        """Whether a relaxation's point can lead on: solved, or stopped at a point that is feasible for the relaxation."""
+        if relaxed.solved:
+            return True
+        rows, bounds = self._c.violations(relaxed.w)
+        return max(rows.max(initial=0.0), bounds.max(initial=0.0)) <= self._tolerances.feasibility
+
+    def _biactive(self, at):
+        """Below this both sides of a pair may be zero at the solution: O(sqrt) of the largest product left."""
+        return max(np.sqrt(np.max(at.G * at.H, initial=0.0)), self._tolerances.biactive)
 
     def _settled(self, f_relaxed):
         """Gap test: the incumbent is good enough if the relaxed objective no longer lies clearly below it."""
@@ -304,7 +318,7 @@ class HybridSolver:
         rows, bounds = c.violations(w, at)
         low = np.minimum(at.G, at.H)
         violation = max(rows.max(initial=0.0), bounds.max(initial=0.0), -low.min(initial=0.0))
-        biactive = np.count_nonzero(np.maximum(at.G, at.H) <= max(np.sqrt(eps), self._tolerances.biactive))
+        biactive = int(np.count_nonzero(np.maximum(at.G, at.H) <= self._biactive(at)))
         step = Step(
             kind,
             eps,
