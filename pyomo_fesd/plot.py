@@ -1,0 +1,74 @@
+"""Pictures of trajectories with the elements and the switches marked."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from pyomo_fesd.elements.grid import read_grid
+from pyomo_fesd.errors import FesdError
+from pyomo_fesd.timeindex import find_continuous_set
+from pyomo_fesd.trajectory import physical_time, switches, trajectory
+
+
+def plot(model, wrt=None, names=None, units=None):
+    """Draw trajectories, one panel each, element boundaries as ticks below and switches as dashed lines.
+
+    Parameters
+    ----------
+    names : list of str, optional
+        columns of ``trajectory``; a name of an indexed variable (``M``) takes all its columns (``M[1]``, ``M[2]``), the name of
+        a Disjunction its multipliers.  Default: the differential states and all multipliers.
+    units : dict, optional
+        label of the vertical axis by name
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        not shown and not registered with pyplot: save it with ``savefig``
+
+    Raises
+    ------
+    FesdError
+        for a name that is no column
+    """
+    wrt = find_continuous_set(model, wrt, 'plot')
+    frame = trajectory(model, wrt)
+    names = names or [c for c in frame.columns if c not in ('label', 'element')]
+    groups = [(name, _columns(frame, name)) for name in names]
+    times = physical_time(model, wrt)
+    boundaries = [times[label] for label in wrt.get_finite_elements()]
+    figure = Figure(figsize=(7, 1 + 1.9 * len(groups)), layout='constrained')
+    axes = np.atleast_1d(figure.subplots(len(groups), 1, sharex=True))
+    for axis, (name, columns) in zip(axes, groups):
+        for column in columns:
+            _draw(axis, frame, column, wrt)
+        axis.set_ylabel((units or {}).get(name, name))
+        if len(columns) > 1:
+            axis.legend(fontsize='small')
+        for switch in switches(model, wrt):
+            axis.axvline(switch.time, color='0.4', linestyle='--', linewidth=0.8)
+        axis.plot(boundaries, np.zeros(len(boundaries)), '|', color='0.5', markersize=5, transform=axis.get_xaxis_transform())
+        axis.margins(x=0.01)
+    axes[-1].set_xlabel(wrt.local_name)
+    return figure
+
+
+def _columns(frame, name):
+    found = [c for c in frame.columns if c == name or c.startswith((f'{name}[', f'{name}: '))]
+    if not found:
+        raise FesdError(name, "plot: no trajectory of this name", f"one of: {', '.join(map(str, frame.columns[2:]))}")
+    return found
+
+
+def _draw(axis, frame, column, wrt):
+    """States as lines through all points; multipliers element by element, as they jump at boundaries."""
+    label = column.split(': ')[-1]
+    if ': ' not in column:
+        axis.plot(frame.index, frame[column], '.-', markersize=3, linewidth=1.2, label=label)
+        return
+    color = axis._get_lines.get_next_color()
+    boundaries = read_grid(wrt, [wrt.first(), wrt.last()]).elements
+    for k, element in enumerate(boundaries):
+        part = frame[frame['element'] == element.n]
+        left = frame.index[frame['label'] == element.left][0]
+        time, values = [left, *part.index], [part[column].iloc[0], *part[column]]
+        axis.plot(time, values, '-', color=color, linewidth=1.2, label=label if k == 0 else None)

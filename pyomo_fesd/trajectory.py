@@ -1,0 +1,174 @@
+"""Results on physical time: where the labels lie, what the trajectories are, when the modes switch."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from pyomo.common.collections import ComponentMap
+from pyomo.core import Block, Var, value
+from pyomo.gdp import Disjunction
+from pyomo.mpec import Complementarity
+
+from pyomo_fesd import marks
+from pyomo_fesd.complementarity import read
+from pyomo_fesd.elements.grid import read_grid
+from pyomo_fesd.records import records
+from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set, strip_time
+
+#: A multiplier nearer than this to 0 (or to 1) counts as off (or on).
+CLEAR = 1e-6
+
+
+class Switch(NamedTuple):
+    """One change of mode at physical ``time`` (units of the ContinuousSet); a sliding mode reads ``sliding a | b``."""
+
+    time: float
+    disjunction: str
+    before: str
+    after: str
+
+    def __str__(self):
+        return f"time {self.time:.10g}: {self.disjunction}  {self.before} -> {self.after}"
+
+
+class Switches(list):
+    """The switches in order of time; prints one a line, and ``pandas.DataFrame(switches)`` has the fields as columns."""
+
+    def __repr__(self):
+        return '\n'.join(map(str, self)) or 'no switch'
+
+    __str__ = __repr__
+
+
+def physical_time(model, wrt=None):
+    """Physical time of every label of ``wrt``.
+
+    With element lengths h_n a label of element n stands for t_{n,0} + c_r h_n, t_{n,0} the sum of the lengths before
+    (theory, eq. 9 and 10); on an ordinary grid labels are physical time.
+
+    Returns
+    -------
+    dict label -> float, in order of time
+    """
+    wrt = find_continuous_set(model, wrt, 'physical_time')
+    block = records(model).grids.get(wrt)
+    if block is None or not discretised(wrt):
+        return {t: float(t) for t in wrt}
+    grid = _grid(wrt)
+    time = {wrt.first(): float(wrt.first())}
+    for element in grid.elements:
+        left, h = time[element.left], element.length * value(block.r[element.n])
+        time.update((label, left + c * h) for label, c in zip(element.points, grid.tau))
+        time[element.right] = left + h
+    return {t: time[t] for t in wrt}
+
+
+def _grid(wrt):
+    return read_grid(wrt, [wrt.first(), wrt.last()])
+
+
+def trajectory(model, wrt=None):
+    """Every variable over time on physical time.
+
+    Variables are named without their time index (``x``, ``unit.F[a]``); each Disjunction adds the multipliers of its modes
+    (``sgn: below``), 1 where the mode is active, 0 where it is not, between in a sliding mode.  The columns ``element`` and
+    ``label`` tell where a row comes from.
+
+    Returns
+    -------
+    pandas.DataFrame, index ``time``
+    """
+    wrt = find_continuous_set(model, wrt, 'trajectory')
+    times = physical_time(model, wrt)
+    index = TimeIndex(wrt)
+    owned = (v for v in model.component_objects(Var, descend_into=Block) if not v.is_reference() and not marks.is_generated(v))
+    families = index.families(data for v in owned for data in v.values())
+    columns = {'label': list(times), 'element': _elements(wrt, times)}
+    for name, values in families.items():
+        columns[strip_time(name)] = [_number(values.get(t)) for t in times]
+    for name, modes in _multipliers(model, index).items():
+        for mode, weights in modes.items():
+            columns[f'{name}: {mode}'] = [_number(weights.get(t)) for t in times]
+    return pd.DataFrame(columns, index=pd.Index(times.values(), name='time'))
+
+
+def _number(expr):
+    result = None if expr is None else value(expr, exception=False)
+    return np.nan if result is None else result
+
+
+def _elements(wrt, times):
+    if not discretised(wrt) or 'tau_points' not in wrt.get_discretization_info():
+        return [0] * len(times)
+    owner = _grid(wrt).element_of()
+    return [owner[t].n if t in owner else 1 for t in times]
+
+
+def _multipliers(model, index):
+    """``{disjunction: {mode: {label: expression}}}`` of every Disjunction over time that ``fesd.dcs`` transformed."""
+    weights = ComponentMap(marks.marked(model, marks.INDICATOR))
+    found = {}
+    for name, family in index.families(model.component_data_objects(Disjunction, descend_into=Block)).items():
+        modes = {}
+        for t, disjunction in family.items():
+            for i, disjunct in enumerate(disjunction.disjuncts, start=1):
+                if disjunct in weights:
+                    modes.setdefault(_mode_name(disjunction, disjunct, i), {})[t] = weights[disjunct]
+        if modes:
+            found[strip_time(name)] = modes
+    return found
+
+
+def _mode_name(disjunction, disjunct, number):
+    """The Disjunct's own name; a mode written as a list of expressions is called by its number."""
+    component = disjunct.parent_component()
+    if component is disjunction.parent_component()._autodisjuncts:
+        return f'mode {number}'
+    return component.local_name
+
+
+def switches(model, wrt=None):
+    """When which Disjunction, or hand-written Complementarity over time, changes its active set.
+
+    An element of a moving grid has one active set (eq. 11), so switches lie on element boundaries.
+
+    Returns
+    -------
+    Switches
+        list of ``Switch(time, disjunction, before, after)``
+    """
+    wrt = find_continuous_set(model, wrt, 'switches')
+    times, grid, index = physical_time(model, wrt), _grid(wrt), TimeIndex(wrt)
+    systems = _multipliers(model, index) | _conditions(model, index)
+    found = Switches()
+    for name, modes in systems.items():
+        before = None
+        for element in grid.elements:
+            active = _active(modes, element)
+            if before is not None and active != before:
+                found.append(Switch(times[element.left], name, before, active))
+            before = active
+    return Switches(sorted(found, key=lambda s: s.time))
+
+
+def _active(modes, element):
+    """The mode with a positive multiplier inside an element; several of them slide."""
+    on = [
+        mode
+        for mode, weights in modes.items()
+        if any(t in weights and value(weights[t]) > CLEAR for t in element.points)
+    ]
+    return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on) if on else 'none'
+
+
+def _conditions(model, index):
+    """Hand-written complementarities as systems of two modes, named by the side that is positive."""
+    own = (c for c in model.component_data_objects(Complementarity, descend_into=Block) if not marks.is_generated(c))
+    found = {}
+    for name, family in index.families(own).items():
+        sides = {t: read(c) for t, c in family.items()}
+        found[strip_time(name)] = {
+            'G > 0': {t: pair.G for t, pair in sides.items()},
+            'H > 0': {t: pair.H for t, pair in sides.items()},
+        }
+    return found
