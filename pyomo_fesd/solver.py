@@ -21,7 +21,12 @@ from pyomo.contrib.solver.common.config import SolverConfig
 from pyomo.contrib.solver.common.factory import SolverFactory
 from pyomo.contrib.solver.common.results import Results, SolutionStatus, TerminationCondition
 from pyomo.contrib.solver.common.solution_loader import SolutionLoader
-from pyomo.contrib.solver.common.util import NoOptimalSolutionError, NoSolutionError
+from pyomo.contrib.solver.common.util import (
+    NoDualsError,
+    NoOptimalSolutionError,
+    NoReducedCostsError,
+    NoSolutionError,
+)
 from pyomo.core import value
 from pyomo.core.staleflag import StaleFlagManager
 
@@ -83,26 +88,48 @@ class MpecHybridConfig(SolverConfig):
 
 
 class _Loader(SolutionLoader):
-    """Values of the point found; also sets the indicator variables of the disjuncts that ``fesd.dcs`` transformed."""
+    """Values of the point found and the multipliers of its branch NLP.
 
-    def __init__(self, model, values):
-        self._pyomo_model, self._values = model, values
+    Loading also sets the indicator variables of the disjuncts that ``fesd.dcs`` transformed.
+    """
+
+    def __init__(self, model, compiled, run):
+        self._pyomo_model, self._c, self._w = model, compiled, run.w
+        self._nlp = None if run.point is None else run.point.nlp
 
     def get_number_of_solutions(self):
-        return int(self._values is not None)
+        """1, or 0 if no point was reached."""
+        return int(self._w is not None)
 
     def get_vars(self, vars_to_load=None):
-        if self._values is None:
+        """Values by variable."""
+        if self._w is None:
             raise NoSolutionError()
-        if vars_to_load is None:
-            return ComponentMap(self._values.items())
-        return ComponentMap((v, self._values[v]) for v in vars_to_load)
+        return _select(ComponentMap, self._c.variables, self._w, vars_to_load)
+
+    def get_duals(self, cons_to_load=None):
+        """Multipliers of the constraints in the branch NLP, in Pyomo's sign; the pairs are fixed there."""
+        if self._nlp is None:
+            raise NoDualsError()
+        return _select(dict, self._c.constraints, -self._c.sign * self._nlp.lam_g, cons_to_load)
+
+    def get_reduced_costs(self, vars_to_load=None):
+        """Multipliers of the bounds in the branch NLP, in Pyomo's sign."""
+        if self._nlp is None:
+            raise NoReducedCostsError()
+        return _select(ComponentMap, self._c.variables, -self._c.sign * self._nlp.lam_x, vars_to_load)
 
     def load_vars(self, vars_to_load=None):
         super().load_vars(vars_to_load)
         for disjunct, weight in marks.marked(self._pyomo_model, marks.INDICATOR):
             # Pyomo's own link: near 0 or 1 it sets the Boolean, between it leaves it unset
             disjunct.binary_indicator_var.set_value(value(weight, exception=False), skip_validation=True)
+
+
+def _select(kind, components, numbers, wanted):
+    """``kind`` from components to numbers, for all or the wanted ones."""
+    found = kind(zip(components, map(float, numbers)))
+    return found if wanted is None else kind((c, found[c]) for c in wanted)
 
 
 @document_class_CONFIG(methods=['solve'])
@@ -152,16 +179,12 @@ class MpecHybrid(SolverBase):
         config = self._configure(kwds)
         timer = config.timer = config.timer or HierarchicalTimer()
         StaleFlagManager.mark_all_as_stale()
-        timer.start('mpec_hybrid')
-        try:
-            timer.start('compile')
-            compiled = compile_problem(read_problem(model), timer)
-            timer.stop('compile')
-            table = Table(config.tee, compiled)
-            run = HybridSolver(compiled, config, timer, table.row).solve()
-        finally:
-            timer.reset() if False else None
-        timer.stop('mpec_hybrid')
+        problem = read_problem(model)
+        timer.start('compile')
+        compiled = compile_problem(problem, timer)
+        timer.stop('compile')
+        table = Table(config.tee, compiled)
+        run = HybridSolver(compiled, config, timer, table.row).solve()
         _fill(results, model, compiled, run)
         results.solver_config = config
         results.timing_info.timer = timer
@@ -188,7 +211,7 @@ class MpecHybrid(SolverBase):
         optimal = results.solution_status is SolutionStatus.optimal
         if config.raise_exception_on_nonoptimal_result and not optimal:
             raise NoOptimalSolutionError(f"mpec_hybrid: {results.extra_info.outcome}. {results.extra_info.reason}")
-        if config.load_solutions and results.solution_status is not SolutionStatus.noSolution:
+        if config.load_solutions and results.solution_loader.get_number_of_solutions():
             results.solution_loader.load_solution()
         return results
 
@@ -196,13 +219,11 @@ class MpecHybrid(SolverBase):
 def _fill(results, model, c, run):
     """Pyomo's results from a ``Run``."""
     condition, status = CONDITIONS[run.outcome]
-    if run.point is None and status is SolutionStatus.unknown and run.w is None:
-        status = SolutionStatus.noSolution
-    elif run.point is not None and status is SolutionStatus.unknown:
-        status = SolutionStatus.feasible
+    if status is SolutionStatus.unknown:
+        # stopped by a limit: what the best point is decides
+        status = _status_of(run)
     results.termination_condition, results.solution_status = condition, status
-    values = None if run.w is None else ComponentMap(zip(c.variables, map(float, run.w)))
-    results.solution_loader = _Loader(model, values)
+    results.solution_loader = _Loader(model, c, run)
     if run.point is not None and c.has_objective:
         results.incumbent_objective = c.sign * run.point.f
     info = results.extra_info
@@ -220,6 +241,12 @@ def _fill(results, model, c, run):
     if info.violated:
         info.reason += '; largest violations: ' + ', '.join(f'{name} ({amount:.1e})' for name, amount in info.violated)
     info.steps = run.steps
+
+
+def _status_of(run):
+    if run.w is None:
+        return SolutionStatus.noSolution
+    return SolutionStatus.unknown if run.point is None else SolutionStatus.feasible
 
 
 def _violated(c, w):

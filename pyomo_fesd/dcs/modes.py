@@ -67,7 +67,7 @@ class _Equation:
         return v in self.linear or v in self.nonlinear
 
 
-def read_equations(disjunction, disjuncts, equalities, is_derivative, is_state):
+def read_equations(disjunction, disjuncts, equalities, is_derivative, is_state, cache):
     """Find the variables that the modes define and solve every mode's equations for them.
 
     Parameters
@@ -75,6 +75,8 @@ def read_equations(disjunction, disjuncts, equalities, is_derivative, is_state):
     equalities : list of lists of ConstraintData
         the equality constraints of each disjunct
     is_derivative, is_state : callables VarData -> bool
+    cache : dict
+        the choice made before, by position; the same Disjunction at another time is tried with it first
 
     Raises
     ------
@@ -84,7 +86,7 @@ def read_equations(disjunction, disjuncts, equalities, is_derivative, is_state):
     modes = [[_read(con) for con in cons] for cons in equalities]
     _require_equal_counts(disjunction, disjuncts, modes, is_derivative)
     wanted = _derivatives(disjunction, disjuncts, modes, is_derivative)
-    defined = wanted + _algebraic(disjunction, disjuncts, modes, wanted, is_state)
+    defined = wanted + _algebraic(disjunction, modes, wanted, is_state, cache)
     rhs = [_solve(equations, defined) for equations in modes]
     return ModeEquations(defined, rhs, equalities)
 
@@ -171,15 +173,15 @@ def _derivatives(disjunction, disjuncts, modes, is_derivative):
     return list(found)
 
 
-def _algebraic(disjunction, disjuncts, modes, derivatives, is_state):
+def _algebraic(disjunction, modes, derivatives, is_state, cache):
     """The algebraic variables that make up the rest: those for which every mode's equations can be solved."""
     number = len(modes[0]) - len(derivatives)
     if number == 0:
         return []
-    candidates = ComponentMap()
-    for v in itertools.chain.from_iterable(itertools.chain(e.linear, e.nonlinear) for e in modes[0]):
-        if v not in derivatives and not is_state(v) and all(any(e.mentions(v) for e in eqs) for eqs in modes):
-            candidates[v] = None
+    candidates = _candidates(modes, derivatives, is_state)
+    usual = [candidates[k] for k in cache.get('chosen', ()) if k < len(candidates)]
+    if len(usual) == number and all(_solvable(eqs, [*derivatives, *usual]) for eqs in modes):
+        return usual
     if comb(len(candidates), number) > MOST_CHOICES:
         candidates = [v for v in candidates if any(v in e.alone for eqs in modes for e in eqs)]
     choices = list(itertools.combinations(candidates, number))
@@ -187,13 +189,23 @@ def _algebraic(disjunction, disjuncts, modes, derivatives, is_state):
     implicit = [c for c in choices if all(_matching(eqs, [*derivatives, *c]) for eqs in modes)]
     for group in (explicit, implicit):
         if group:
-            return list(_preferred(disjunction, modes, group))
+            chosen = _preferred(disjunction, modes, group)
+            order = ComponentMap((v, k) for k, v in enumerate(candidates))
+            cache['chosen'] = [order[v] for v in chosen] if group is explicit else ()
+            return list(chosen)
     raise FesdError(
         disjunction,
         "the modes do not define the same variables: no choice of "
         f"{number} of the variables that all of them mention ({_names(candidates)}) can be solved for in every disjunct",
         "let every disjunct define the same variables, one equation each",
     )
+
+
+def _candidates(modes, derivatives, is_state):
+    """Algebraic variables that every mode mentions, in order of appearance."""
+    known = ComponentSet(derivatives)
+    mentioned = [ComponentSet(v for e in eqs for v in itertools.chain(e.linear, e.nonlinear)) for eqs in modes]
+    return [v for v in mentioned[0] if v not in known and not is_state(v) and all(v in others for others in mentioned[1:])]
 
 
 def _preferred(disjunction, modes, choices):

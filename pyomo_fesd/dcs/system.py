@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import BooleanVar, Block, Constraint, LogicalConstraint, Var
+from pyomo.core import Block, BooleanVar, Constraint, LogicalConstraint, Var
+from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import DerivativeVar
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
@@ -56,6 +57,7 @@ class Reader:
         self._derivatives = ComponentSet(derivatives)
         self._states = ComponentSet(d.get_state_var() for d in derivatives)
         self._patterns = ComponentMap()
+        self._choices = ComponentMap()
 
     def is_derivative(self, v):
         """Whether ``v`` is data of a derivative with respect to time."""
@@ -84,9 +86,11 @@ class Reader:
             return System(disjunction, modes, None, None)
         split = [_constraints(d) for d in modes]
         self._refuse_derivatives_in_regions(modes, split)
-        equations = read_equations(disjunction, modes, [eq for eq, _ in split], self.is_derivative, self.is_state)
-        cache = self._patterns.setdefault(disjunction.parent_component(), {})
-        regions = read_regions(disjunction, modes, [ineq for _, ineq in split], cache)
+        source = disjunction.parent_component()
+        choice, patterns = self._choices.setdefault(source, {}), self._patterns.setdefault(source, {})
+        equalities, inequalities = ([part[k] for part in split] for k in (0, 1))
+        equations = read_equations(disjunction, modes, equalities, self.is_derivative, self.is_state, choice)
+        regions = read_regions(disjunction, modes, inequalities, patterns)
         _refuse_defined_in_regions(disjunction, regions, equations)
         return System(disjunction, modes, regions, equations)
 
@@ -114,8 +118,6 @@ class Reader:
                     raise FesdError(var, "a DerivativeVar inside a disjunct", "declare it on the block that holds its state")
 
     def _refuse_derivatives_in_regions(self, modes, split):
-        from pyomo.core.expr.visitor import identify_variables
-
         for disjunct, (_, inequalities) in zip(modes, split):
             for con in inequalities:
                 for v in identify_variables(con.body, include_fixed=True):
@@ -128,8 +130,6 @@ class Reader:
 
 
 def _refuse_defined_in_regions(disjunction, regions, equations):
-    from pyomo.core.expr.visitor import identify_variables
-
     defined = ComponentSet(equations.defined)
     for c in regions.functions:
         for v in identify_variables(c, include_fixed=True):

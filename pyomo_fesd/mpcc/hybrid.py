@@ -6,6 +6,7 @@ below the incumbent's (gap test), and eps may rise again when a relaxation fails
 """
 
 import time
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -48,7 +49,7 @@ class Tolerances:
 
 @dataclass(frozen=True)
 class Step:
-    """One line of the log: an NLP or LPEC with what came out of it."""
+    """One line of the log: an NLP or LPEC with what came out of it; ``w`` is the point (order of ``Compiled.variables``)."""
 
     kind: str
     eps: float
@@ -59,6 +60,7 @@ class Step:
     iterations: int
     status: str
     seconds: float
+    w: np.ndarray = field(repr=False)
 
 
 @dataclass
@@ -73,13 +75,16 @@ class Counts:
 
 @dataclass
 class Point:
-    """An exactly complementary point with its certificate."""
+    """An exactly complementary point: the solution of its branch NLP, with its certificate."""
 
-    w: np.ndarray
+    nlp: object
     f: float
-    zero: np.ndarray
-    equal: np.ndarray
     certificate: object
+
+    @property
+    def w(self):
+        """Values of the variables."""
+        return self.nlp.w
 
 
 @dataclass
@@ -172,6 +177,7 @@ class HybridSolver:
         while True:
             self.run.eps = eps
             relaxed = self._relax(w, eps)
+            self._keep_least_infeasible(relaxed.w)
             if not self._usable(relaxed):
                 if failures == len(RECOVERY):
                     return
@@ -179,7 +185,7 @@ class HybridSolver:
                 w = self._c.x0 if restart else relaxed.w
                 eps, failures, previous = options.eps_init * factor, failures + 1, None
                 continue
-            w = self.run.w = relaxed.w
+            w = relaxed.w
             at = self._c.evaluate(w)
             sets = active_sets(at.G, at.H, self._biactive(at))
             last = eps <= options.eps_final
@@ -191,12 +197,18 @@ class HybridSolver:
                 return
             previous, eps = sets, max(eps * options.eps_factor, options.eps_final)
 
-    def _usable(self, relaxed):
-        """Whether a relaxation's point can lead on: solved, or stopped at a point that is feasible for the relaxation."""
-        if relaxed.solved:
-            return True
-        rows, bounds = self._c.violations(relaxed.w)
-        return max(rows.max(initial=0.0), bounds.max(initial=0.0)) <= self._tolerances.feasibility
+    def _usable(self, result):
+        """Whether an NLP's point can lead on: solved, or stopped where its constraints hold."""
+        return result.solved or self._violation(result.w) <= self._tolerances.feasibility
+
+    def _violation(self, w):
+        rows, bounds = self._c.violations(w)
+        return float(max(rows.max(initial=0.0), bounds.max(initial=0.0)))
+
+    def _keep_least_infeasible(self, w):
+        """Remember the point to report if nothing feasible is found."""
+        if self.run.w is None or self._violation(w) < self._violation(self.run.w):
+            self.run.w = w
 
     def _biactive(self, at):
         """Below this both sides of a pair may be zero at the solution: O(sqrt) of the largest product left."""
@@ -245,7 +257,7 @@ class HybridSolver:
         certificate = self._certify(solved.w, equal)
         if not certificate.feasible:
             return None
-        return Point(solved.w, self._c.evaluate(solved.w).f, zero, equal, certificate)
+        return Point(solved, self._c.evaluate(solved.w).f, certificate)
 
     def _solve_branch(self, w, zero):
         """Two stages where pairs are to be decided (eq. 13): with the penalty to read eta, then with what eta decides."""
@@ -265,42 +277,41 @@ class HybridSolver:
 
     def _branch_nlp(self, w, zero, equal, weight):
         result = self._nlp('branch', 0.0, lambda: self._branch.solve(w, zero, equal, weight))
-        return result if result is not None and result.solved else None
+        return result if result is not None and self._usable(result) else None
 
     def _nlp(self, kind, eps, solve):
-        self._check_limits()
-        started = time.perf_counter()
-        self._timer.start(kind)
-        result = solve()
-        self._timer.stop(kind)
-        if result is None:
-            return None
-        counts = self.run.counts
-        counts.nlps += 1
-        counts.iterations += result.iterations
-        self._log(kind, eps, result.w, result.iterations, result.status, started)
+        with self._timed(kind) as started:
+            result = solve()
+        if result is not None:
+            self.run.counts.nlps += 1
+            self.run.counts.iterations += result.iterations
+            self._log(kind, eps, result.w, result.iterations, result.status, started)
         return result
 
     def _lpec_step(self, w, sets):
-        self._check_limits()
-        started = time.perf_counter()
-        self._timer.start('lpec')
-        result = self._lpec.solve(w, sets, self._tolerances.radius)
-        self._timer.stop('lpec')
+        with self._timed('lpec') as started:
+            result = self._lpec.solve(w, sets, self._tolerances.radius)
         self._count_lpec(result)
         self._log('lpec', 0.0, w, 0, f'{result.value:.1e}', started)
         return result
 
     def _certify(self, w, equal):
-        self._check_limits()
-        started = time.perf_counter()
-        self._timer.start('lpec')
-        certificate = certify(self._c, self._lpec, w, self._tolerances, equal)
-        self._timer.stop('lpec')
+        with self._timed('lpec') as started:
+            certificate = certify(self._c, self._lpec, w, self._tolerances, equal)
         if certificate.lpec is not None:
             self._count_lpec(certificate.lpec)
         self._log('certificate', 0.0, w, 0, certificate.grade.name, started)
         return certificate
+
+    @contextmanager
+    def _timed(self, kind):
+        """Check the limits, then time what follows; gives the time at which it began."""
+        self._check_limits()
+        self._timer.start(kind)
+        try:
+            yield time.perf_counter()
+        finally:
+            self._timer.stop(kind)
 
     def _count_lpec(self, result):
         self.run.counts.lpecs += 1
@@ -315,9 +326,8 @@ class HybridSolver:
     def _log(self, kind, eps, w, iterations, status, started):
         c = self._c
         at = c.evaluate(w)
-        rows, bounds = c.violations(w, at)
         low = np.minimum(at.G, at.H)
-        violation = max(rows.max(initial=0.0), bounds.max(initial=0.0), -low.min(initial=0.0))
+        violation = max(self._violation(w), -low.min(initial=0.0))
         biactive = int(np.count_nonzero(np.maximum(at.G, at.H) <= self._biactive(at)))
         step = Step(
             kind,
@@ -329,6 +339,7 @@ class HybridSolver:
             iterations,
             status,
             time.perf_counter() - started,
+            w,
         )
         self.run.steps.append(step)
         self._show(step)

@@ -76,10 +76,14 @@ class Nlp:
         Ipopt options, over ``IPOPT``
     deadline : float or None
         value of ``time.perf_counter()`` at which to stop
+    jacobian : SX, optional
+        of g by x, where it is known more cheaply than casadi finds it (one dense column defeats its colouring)
     """
 
-    def __init__(self, name, x, p, f, g, options, deadline=None):
+    def __init__(self, name, x, p, f, g, options, deadline=None, jacobian=None):
         settings = {'print_time': False, 'ipopt': IPOPT | options}
+        if jacobian is not None:
+            settings['jac_g'] = ca.Function('nlp_jac_g', [x, p], [g, jacobian], ['x', 'p'], ['g', 'jac_g_x'])
         if deadline is not None:
             self._deadline = _Deadline(x.numel(), g.numel(), p.numel(), deadline)
             settings['iteration_callback'] = self._deadline

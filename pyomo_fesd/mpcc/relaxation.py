@@ -46,8 +46,11 @@ class Elastic(_Relaxation):
     def _build(self, c, rows, options, deadline):
         s, weight = ca.SX.sym('s'), ca.SX.sym('weight')
         f = c.f + c.penalty + weight * s
-        g = ca.vertcat(rows, c.G * c.H - s)
-        self._nlp = Nlp('elastic', ca.vertcat(c.x, s), weight, f, g, options, deadline)
+        products = c.G * c.H
+        by_x = ca.jacobian(ca.vertcat(rows, products), c.x)
+        by_s = ca.vertcat(ca.SX(rows.numel(), 1), -ca.SX.ones(products.numel(), 1))
+        w, g = ca.vertcat(c.x, s), ca.vertcat(rows, products - s)
+        self._nlp = Nlp('elastic', w, weight, f, g, options, deadline, jacobian=ca.horzcat(by_x, by_s))
 
     def solve(self, w, eps):
         """Solve from ``w``; 1/eps is the weight of s."""
