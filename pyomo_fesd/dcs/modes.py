@@ -76,7 +76,7 @@ def read_equations(disjunction, disjuncts, equalities, is_derivative, is_state, 
         the equality constraints of each disjunct
     is_derivative, is_state : callables VarData -> bool
     cache : dict
-        the choice made before, by position; the same Disjunction at another time is tried with it first
+        the choice made before, by position and component; the same Disjunction at another time is tried with it first
 
     Raises
     ------
@@ -179,19 +179,20 @@ def _algebraic(disjunction, modes, derivatives, is_state, cache):
     if number == 0:
         return []
     candidates = _candidates(modes, derivatives, is_state)
-    usual = [candidates[k] for k in cache.get('chosen', ()) if k < len(candidates)]
+    usual = [v for k, home in cache.get('chosen', ()) for v in candidates[k : k + 1] if v.parent_component() is home]
     if len(usual) == number and all(_solvable(eqs, [*derivatives, *usual]) for eqs in modes):
         return usual
+    considered = candidates
     if comb(len(candidates), number) > MOST_CHOICES:
-        candidates = [v for v in candidates if any(v in e.alone for eqs in modes for e in eqs)]
-    choices = list(itertools.combinations(candidates, number))
+        considered = [v for v in candidates if any(v in e.alone for eqs in modes for e in eqs)]
+    choices = list(itertools.combinations(considered, number))
     explicit = [c for c in choices if all(_solvable(eqs, [*derivatives, *c]) for eqs in modes)]
     implicit = [c for c in choices if all(_matching(eqs, [*derivatives, *c]) for eqs in modes)]
     for group in (explicit, implicit):
         if group:
             chosen = _preferred(disjunction, modes, group)
             order = ComponentMap((v, k) for k, v in enumerate(candidates))
-            cache['chosen'] = [order[v] for v in chosen] if group is explicit else ()
+            cache['chosen'] = [(order[v], v.parent_component()) for v in chosen] if group is explicit else ()
             return list(chosen)
     raise FesdError(
         disjunction,
