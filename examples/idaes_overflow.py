@@ -15,6 +15,10 @@ import logging
 from collections import namedtuple
 from math import exp
 
+import matplotlib
+
+matplotlib.use('Agg')
+
 import matplotlib.pyplot as plt
 import pyomo.environ as pyo
 from idaes.core import FlowsheetBlock, MomentumBalanceType
@@ -51,7 +55,7 @@ Reference = namedtuple('Reference', 'overflow_time volume naoh temperature')
 
 
 def build():
-    """The plant with its weir over a continuous time of 0-600 s; feeds and initial contents are fixed."""
+    """The plant with its weir over a continuous time of 0-600 s; ``specify`` gives the inputs once it is discretised."""
     m = plant()
     add_weir(m)
     return m
@@ -78,14 +82,13 @@ def plant():
     )
     m.fs.feed = Arc(source=m.fs.mixer.outlet, destination=m.fs.cstr.inlet)
     pyo.TransformationFactory('network.expand_arcs').apply_to(m)
-    specify(m)
     return m
 
 
 def specify(m):
     """Fix feeds and pressures at every time there is, and the contents of the vessel at the first, which imply its holdups.
 
-    Needed again on the discretised model, because pyomo.dae leaves unfixed what it adds.
+    To be called on the discretised model: pyomo.dae leaves unfixed what it adds.
     """
     for feed, reactant in ((m.fs.mixer.lye, 'NaOH'), (m.fs.mixer.ester, 'EthylAcetate')):
         feed.flow_vol.fix(INFLOW / 2)

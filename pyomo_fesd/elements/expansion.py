@@ -32,7 +32,9 @@ from pyomo.mpec import Complementarity
 
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.marks import is_generated
-from pyomo_fesd.timeindex import is_indexed_by
+from pyomo_fesd.timeindex import TimeIndex, derivatives, is_indexed_by, strip_time
+
+logger = logging.getLogger('pyomo_fesd')
 
 #: Types over time that pyomo.dae expands itself, or rightly leaves alone.
 NATIVE = (Var, Constraint, Expression, Block, DerivativeVar, Param, Suffix, Integral, Piecewise, ContinuousSet)
@@ -47,6 +49,8 @@ REFUSED = {
     Set: "use a Set that does not depend on time",
 }
 PLACES = (Block, Disjunct)
+#: Names that one warning lists.
+SHOWN = 5
 
 
 def discretise(block, wrt, nfe, ncp, scheme):
@@ -59,9 +63,11 @@ def discretise(block, wrt, nfe, ncp, scheme):
     """
     _check(block, wrt)
     with restored_on_error(block, wrt):
+        inputs = _fixed_everywhere(block, wrt)
         place_boundaries(wrt, nfe)
         with hybrid_expansion(block, wrt):
             TransformationFactory('dae.collocation').apply_to(block, wrt=wrt, nfe=nfe, ncp=ncp, scheme=scheme)
+    _warn_unfixed(inputs)
 
 
 def place_boundaries(wrt, nfe):
@@ -73,6 +79,25 @@ def place_boundaries(wrt, nfe):
             wrt.add(round(left + k * (right - left) / each, 6))
     wrt._fe = list(wrt)
     wrt.set_changed(True)
+
+
+def _fixed_everywhere(block, wrt):
+    """Names of variables over time that are fixed at all present points; states excepted, whose ends may both be given."""
+    states = ComponentMap((d.get_state_var(), None) for d in derivatives(block, wrt))
+    fixed = (v for v in block.component_data_objects(Var, descend_into=PLACES) if v.fixed and v.parent_component() not in states)
+    families = TimeIndex(wrt).families(fixed)
+    return [strip_time(name) for name, family in families.items() if len(family) == len(wrt)]
+
+
+def _warn_unfixed(names):
+    if names:
+        more = f' and {len(names) - SHOWN} more' if len(names) > SHOWN else ''
+        logger.warning(
+            "fixed at every time that the model had, but not at the times that discretisation adds: %s%s. "
+            "Fix them again if they are inputs.",
+            ', '.join(names[:SHOWN]),
+            more,
+        )
 
 
 def _check(block, wrt):

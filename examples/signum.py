@@ -1,0 +1,89 @@
+"""Signum: the smallest system with a switch, solved to machine precision with ten elements.
+
+    dx/dt = 2 - sgn(x),   x(0) = -2,   0 <= t <= 2
+
+    below (x <= 0):  dx/dt = 3        above (x >= 0):  dx/dt = 1
+
+x reaches zero at t_s = 2/3 and ends at x(2) = 2 - t_s = 4/3.  Both pieces are straight lines, so collocation is exact on every
+element that holds only one of them: what error is left is that of the switching time.  On a fixed grid it would be of the
+order of an element's length, whatever the order of the collocation.
+
+nu, the multiplier of the mode below, is 1 before the switch and 0 after it:  dx/dt = 3 nu + (1 - nu) = 1 + 2 nu.
+
+Source: paper, eq. (21) and Fig. 2.  Nothing here has a unit.
+"""
+
+import numpy as np
+import pyomo.dae as dae
+import pyomo.environ as pyo
+
+import pyomo_fesd
+
+END = 2
+ELEMENTS = 10
+SWITCH, FINAL = 2 / 3, 4 / 3  # exact switching time and x(2)
+PICTURE = 'signum.png'
+
+
+def build():
+    """Two modes over a continuous time, as in eq. (21a) and (21b); nothing is left free, so there is no objective."""
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, END))
+    m.x = pyo.Var(m.t, initialize=-2)
+    m.dx = dae.DerivativeVar(m.x)
+    m.x[0].fix(-2)
+
+    @m.Disjunct(m.t)
+    def below(d, t):
+        d.region = pyo.Constraint(expr=m.x[t] <= 0)
+        d.ode = pyo.Constraint(expr=m.dx[t] == 3)
+
+    @m.Disjunct(m.t)
+    def above(d, t):
+        d.region = pyo.Constraint(expr=m.x[t] >= 0)
+        d.ode = pyo.Constraint(expr=m.dx[t] == 1)
+
+    @m.Disjunction(m.t)
+    def sgn(m, t):
+        return [m.below[t], m.above[t]]
+
+    return m
+
+
+def solve(m):
+    """The three pieces in a row, elements by the 4th order Gauss scheme of the paper; returns the solver's results."""
+    pyo.TransformationFactory('fesd.dcs').apply_to(m)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, wrt=m.t, nfe=ELEMENTS, ncp=2, scheme='LAGRANGE-LEGENDRE')
+    return pyo.SolverFactory('mpec_hybrid').solve(m)
+
+
+def boundaries(m):
+    """Physical times of the element boundaries."""
+    times = pyomo_fesd.physical_time(m, m.t)
+    return np.array([times[label] for label in m.t.get_finite_elements()])
+
+
+def draw(m):
+    """x and nu over time with the elements as ticks and the switch as a dashed line (paper, Fig. 2)."""
+    figure = pyomo_fesd.plot(m, m.t, ['x', 'sgn: below'], units={'x': 'state x', 'sgn: below': 'multiplier ν of x < 0'})
+    figure.savefig(PICTURE, dpi=150)
+
+
+def main():
+    """Solve, say in words what was found, draw."""
+    m = build()
+    results = solve(m)
+    (switch,) = pyomo_fesd.switches(m, m.t)
+    lengths = np.diff(boundaries(m))
+    before = np.count_nonzero(boundaries(m)[1:] <= switch.time)
+
+    print(f'mpec_hybrid: {results.solver.message}, {results.solver.nlps} NLPs with {results.solver.nlp_iterations} iterations.')
+    print(f'x switches from {switch.before} to {switch.after} zero at t = {switch.time:.12f}, {switch.time - SWITCH:+.1e} off 2/3.')
+    print(f'x(2) = {m.x[END].value:.12f}, {m.x[END].value - FINAL:+.1e} off 4/3.')
+    print(f'The switch is a boundary: {before} elements of length {lengths[0]:.6f} before it, {ELEMENTS - before} of {lengths[-1]:.6f} after.')
+    draw(m)
+    print(f'x and nu over time: {PICTURE}')
+
+
+if __name__ == '__main__':
+    main()
