@@ -12,6 +12,7 @@ that of R = 0.082 L atm/(mol K); with the R below it is 9.35 s.
 """
 
 import numpy as np
+import pandas as pd
 import pyomo.dae as dae
 import pyomo.environ as pyo
 from matplotlib.figure import Figure
@@ -29,7 +30,7 @@ VALVE = 0.1  # mol/(s atm)
 M_G0, M_L0 = 6.83, 260.0  # mol
 HORIZON = 20.0  # s
 
-#: Event-located reference: switch time (s), gas holdup (mol) and pressure (atm) at the end.
+#: Event-located reference: switching time (s), gas holdup (mol) and pressure (atm) at the end.
 EXACT = {'t_s': 9.354868538871, 'M_G': 5.496072704665, 'P': 27.059474275603}
 PICTURE = 'gas_liquid_tank.png'
 
@@ -37,38 +38,40 @@ PICTURE = 'gas_liquid_tank.png'
 def build():
     """The tank as an engineer writes it: pressure and outlet flows are algebraic variables, the modes say what flows."""
     m = balances()
-    m.liquid = Disjunct(m.t, rule=lambda d, t: takes_liquid(d, m, t))
-    m.gas = Disjunct(m.t, rule=lambda d, t: takes_gas(d, m, t))
+    m.liquid = Disjunct(m.t, rule=liquid)
+    m.gas = Disjunct(m.t, rule=gas)
     m.outlet = Disjunction(m.t, rule=lambda m, t: [m.liquid[t], m.gas[t]])
     return m
 
 
 def build_in_blocks():
-    """The same with an outlet block at every time, which holds its two modes and the Disjunction."""
+    """The same with a block for the outlet at every time, which holds the two modes and the Disjunction."""
     m = balances()
 
     @m.Block(m.t)
     def pipe(b, t):
-        b.liquid = Disjunct(rule=lambda d: takes_liquid(d, b.model(), t))
-        b.gas = Disjunct(rule=lambda d: takes_gas(d, b.model(), t))
+        b.liquid = Disjunct(rule=lambda d: liquid(d, t))
+        b.gas = Disjunct(rule=lambda d: gas(d, t))
         b.outlet = Disjunction(expr=[b.liquid, b.gas])
 
     return m
 
 
 def build_eliminated():
-    """The same without algebraic variables: the modes give the derivatives of the two states, as in eq. (22a) and (22b)."""
+    """The same without algebraic variables: the modes give the derivatives of the holdups, as in eq. (22a) and (22b)."""
     m = holdups()
     m.P = pyo.Expression(m.t, rule=lambda m, t: m.M_G[t] * R * T / (V - m.M_L[t] / RHO_L))
 
     @m.Disjunct(m.t)
     def liquid(d, t):
+        m = d.model()
         d.region = pyo.Constraint(expr=m.M_L[t] / RHO_L >= V_S)
         d.M_G = pyo.Constraint(expr=m.dM_G[t] == F_G)
         d.M_L = pyo.Constraint(expr=m.dM_L[t] == F_L - through_valve(m, t))
 
     @m.Disjunct(m.t)
     def gas(d, t):
+        m = d.model()
         d.region = pyo.Constraint(expr=m.M_L[t] / RHO_L <= V_S)
         d.M_G = pyo.Constraint(expr=m.dM_G[t] == F_G - through_valve(m, t))
         d.M_L = pyo.Constraint(expr=m.dM_L[t] == F_L)
@@ -78,7 +81,7 @@ def build_eliminated():
 
 
 def holdups():
-    """The two states, in mol, with their derivatives and initial values."""
+    """The two states (mol) with their derivatives and initial values."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, HORIZON))
     m.M_G = pyo.Var(m.t, initialize=M_G0, bounds=(0, None))
@@ -112,63 +115,99 @@ def balances():
     return m
 
 
-def through_valve(m, t):
-    """What the valve lets through, in mol/s, be it liquid or gas (eq. 22d)."""
-    return VALVE * (m.P[t] - P_OUT)
-
-
-def takes_liquid(d, m, t):
-    """Mode of a level above the outlet."""
+def liquid(d, t):
+    """Mode of a level above the outlet: liquid flows."""
+    m = d.model()
     d.region = pyo.Constraint(expr=m.M_L[t] / RHO_L >= V_S)
     d.L = pyo.Constraint(expr=m.L[t] == through_valve(m, t))
     d.G = pyo.Constraint(expr=m.G[t] == 0)
 
 
-def takes_gas(d, m, t):
-    """Mode of a level below the outlet."""
+def gas(d, t):
+    """Mode of a level below the outlet: gas flows."""
+    m = d.model()
     d.region = pyo.Constraint(expr=m.M_L[t] / RHO_L <= V_S)
     d.L = pyo.Constraint(expr=m.L[t] == 0)
     d.G = pyo.Constraint(expr=m.G[t] == through_valve(m, t))
 
 
+def through_valve(m, t):
+    """What the valve lets through, liquid or gas, in mol/s (eq. 22d)."""
+    return VALVE * (m.P[t] - P_OUT)
+
+
 def solve(m, nfe=100, ncp=3):
-    """Radau elements, then the solver; returns its results."""
+    """Elements by Radau's scheme, then the solver; returns its results."""
     pyo.TransformationFactory('fesd.dcs').apply_to(m)
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, wrt=m.t, nfe=nfe, ncp=ncp)
     return pyo.SolverFactory('mpec_hybrid').solve(m)
 
 
 def found(m):
-    """What EXACT lists, as solved; and the one switch."""
+    """What ``EXACT`` lists, as solved."""
     (switch,) = pyomo_fesd.switches(m, m.t)
-    return {'t_s': switch.time, 'M_G': m.M_G[HORIZON].value, 'P': pyo.value(m.P[HORIZON])}, switch
+    return {'t_s': switch.time, 'M_G': m.M_G[HORIZON].value, 'P': pyo.value(m.P[HORIZON])}
 
 
-def draw(m, filename):
-    """Liquid holdup, pressure, fraction of the liquid mode and element lengths over time (s), the true switch marked."""
-    frame, times = pyomo_fesd.trajectory(m, m.t), pyomo_fesd.physical_time(m, m.t)
-    boundaries = [times[label] for label in m.t.get_finite_elements()]
-    fraction = next(name for name in frame.columns if name.endswith('outlet: liquid'))
-    figure = Figure(figsize=(10, 6.5), layout='constrained')
-    axes = figure.subplots(2, 2, sharex=True)
-    axes[0, 0].plot(frame.index, frame['M_L'])
-    axes[0, 0].set_ylabel('liquid holdup $M_L$ (mol)')
-    axes[0, 1].plot(frame.index, frame['P'])
-    axes[0, 1].set_ylabel('pressure $P$ (atm)')
-    axes[1, 0].plot(frame.index, frame[fraction])
-    axes[1, 0].set_ylabel('fraction ν of the liquid mode (–)')
-    axes[1, 1].stairs(np.diff(boundaries), boundaries, baseline=None)
-    axes[1, 1].set_ylabel('element length $h_n$ (s)')
+def boundaries(m):
+    """Times of the element boundaries (s)."""
+    times = pyomo_fesd.physical_time(m, m.t)
+    return np.array([times[label] for label in m.t.get_finite_elements()])
+
+
+def draw(m):
+    """Liquid holdup, pressure, fraction of the liquid mode and element lengths over time, the true switch marked."""
+    frame, ends = pyomo_fesd.trajectory(m, m.t), boundaries(m)
+    figure = Figure(figsize=(10, 6), layout='constrained')
+    (holdup, pressure), (fraction, length) = axes = figure.subplots(2, 2, sharex=True)
+    holdup.plot(frame['M_L'])
+    holdup.set_ylabel('liquid holdup $M_L$ (mol)')
+    pressure.plot(frame['P'])
+    pressure.set_ylabel('pressure $P$ (atm)')
+    fraction.plot(frame['outlet: liquid'], drawstyle='steps-pre')  # it jumps; a switch has the value from before
+    fraction.set_ylabel('fraction ν of the liquid mode')
+    length.stairs(np.diff(ends), ends, baseline=None, linewidth=1.5)
+    length.set_ylabel('element length $h_n$ (s)')
     for axis in axes.flat:
         axis.axvline(EXACT['t_s'], color='0.4', linestyle='--', linewidth=0.8)
         axis.margins(x=0.01)
     for axis in axes[1]:
         axis.set_xlabel('time (s)')
-    figure.savefig(filename, dpi=150)
+    holdup.annotate('exact switch', (EXACT['t_s'], 0.9), (4, 0), ('data', 'axes fraction'), 'offset points', color='0.4')
+    figure.savefig(PICTURE, dpi=150)
+
+
+def tell(m):
+    """Say in words what was found, with errors."""
+    values, frame = found(m), pyomo_fesd.trajectory(m, m.t)
+    error = {name: value - EXACT[name] for name, value in values.items()}
+    (switch,) = pyomo_fesd.switches(m, m.t)
+    slide = frame[frame.index > switch.time]
+    fraction = slide['outlet: liquid'] * VALVE * (slide['P'] - P_OUT) / F_L
+    lengths = np.diff(boundaries(m))
+    print(f"The level falls to the outlet at {values['t_s']:.9f} s, {error['t_s']:+.1e} s off the exact time.")
+    print(f"There it stays ({switch.after}), to {np.abs(slide['M_L'] / RHO_L - V_S).max():.0e} L.")
+    print(f"Of what the valve lets through {slide['outlet: liquid'].iloc[-1]:.6f} is liquid at {HORIZON:.0f} s;", end=' ')
+    print(f"as much leaves as comes in, to {np.abs(fraction - 1).max():.0e}.")
+    print(f"M_G({HORIZON:.0f} s) = {values['M_G']:.9f} mol, {error['M_G']:+.1e} off; ", end='')
+    print(f"P({HORIZON:.0f} s) = {values['P']:.9f} atm, {error['P']:+.1e} off.")
+    print(f"Elements are {lengths[0]:.6f} s long before the switch, {lengths[-1]:.6f} s after it.\n")
 
 
 def main():
-    pass
+    """Solve all three forms, say in words what was found, compare them, draw the first."""
+    forms = {'as written': build(), 'in blocks': build_in_blocks(), 'eliminated': build_eliminated()}
+    for m in forms.values():
+        solve(m)
+    first = forms['as written']
+    tell(first)
+    print('Three ways to write it, their sizes and errors (s, mol, atm):')
+    sizes = pd.DataFrame({name: pyomo_fesd.report(m) for name, m in forms.items()})
+    errors = pd.DataFrame({name: pd.Series(found(m)) - pd.Series(EXACT) for name, m in forms.items()})
+    print(sizes.to_string())
+    print(errors.to_string(float_format='{:+.1e}'.format))
+    draw(first)
+    print(f'\nHoldup, pressure, fraction of the liquid mode and element lengths: {PICTURE}')
 
 
 if __name__ == '__main__':

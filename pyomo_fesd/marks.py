@@ -6,7 +6,7 @@ A mark is a ``Suffix(direction=LOCAL)`` with one of the names below on the block
 =================  ========================  ===========================================================================
 mark               on                        value
 =================  ========================  ===========================================================================
-CONTINUOUS         Var                       ``True``: continuous in time, as lam, p, n are (theory, eq. 3 and 5)
+CONTINUOUS         Var                       the Constraint by which it follows from the states: lam, p, n are continuous in time
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive

@@ -34,8 +34,8 @@ def declare(block, index, regions):
     block.stationarity = Constraint(*index, block.regions)
     block.simplex = Constraint(*index)
     block.complementarity = Complementarity(*index, block.regions)
-    marks.mark(block, marks.CONTINUOUS, block.lam)
-    marks.mark(block, marks.CONTINUOUS, block.mu)
+    for part in (block.lam, block.mu):
+        marks.mark(block, marks.CONTINUOUS, part, block.stationarity)
 
 
 def add(block, index, system):

@@ -37,7 +37,7 @@ def declare(block, index):
     block.complementarity = Complementarity(*index, [1, 2])
     marks.mark(block, marks.SELECTOR, block.nu)
     for part in (block.p, block.n):
-        marks.mark(block, marks.CONTINUOUS, part)
+        marks.mark(block, marks.CONTINUOUS, part, block.switching)
 
 
 def add(block, index, system):

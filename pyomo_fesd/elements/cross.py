@@ -6,6 +6,7 @@ Leaves: ``cross`` (aggregated pairs by family and element), ``nonnegative`` (sig
 Does not apply: to complementarities without time.
 """
 
+import logging
 from dataclasses import dataclass
 
 from pyomo.common.autoslots import AutoSlots
@@ -19,6 +20,8 @@ from pyomo_fesd import marks
 from pyomo_fesd.complementarity import Mixed, read
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, derivatives, strip_time
+
+logger = logging.getLogger('pyomo_fesd')
 
 #: The three forms of eq. (11), with the number of point indices of each pair.
 FORMS = {'element': 0, 'stage': 1, 'full': 2}
@@ -53,12 +56,18 @@ class Family:
         jumping side first: the selector nu of eq. (11), then lam
     continuous : tuple of bool
         for each side, whether it is continuous in time and so enters with its boundary values too
+    rule : Constraint or None
+        what ties the continuous side to the states, where it is a marked variable
+    jumps_with_controls : bool
+        the switching function contains a control that is held on each stage: no continuity from one stage to the next
     """
 
     name: str
     conditions: dict
     sides: dict
     continuous: tuple
+    rule: object = None
+    jumps_with_controls: bool = False
 
     def points(self, element):
         """Stage labels of ``element`` at which the condition exists."""
@@ -68,13 +77,19 @@ class Family:
         """Side 0 or 1 at the labels that take part in ``element``: its stages, and its boundaries if it is continuous."""
         labels = self.points(element)
         if self.continuous[side]:
-            boundaries = (element.left,) if right_is_stage else (element.left, element.right)
+            left = () if element.opens_stage and self.jumps_with_controls else (element.left,)
+            boundaries = left if right_is_stage else (*left, element.right)
             labels = labels + [t for t in boundaries if t in self.sides]
         return [self.sides[t][side] for t in labels]
 
 
-def read_families(block, wrt, grid):
+def read_families(block, wrt, controls):
     """The complementarities over ``wrt`` on ``block``, by family.
+
+    Parameters
+    ----------
+    controls : list of Var
+        held constant on each stage
 
     Raises
     ------
@@ -82,7 +97,10 @@ def read_families(block, wrt, grid):
         for conditions with two bounds on one side (mixed complementarity) over time
     """
     times = TimeIndex(wrt)
-    continuous = _continuous_variables(block.model(), wrt)
+    rules = ComponentMap(marks.marked(block.model(), marks.CONTINUOUS))
+    continuous = ComponentSet(rules)
+    continuous.update(d.get_state_var() for d in derivatives(block.model(), wrt))
+    held = ComponentSet(controls)
     datas = block.component_data_objects(Complementarity, active=True, descend_into=Block)
     families = []
     for name, conditions in times.families(datas).items():
@@ -98,21 +116,40 @@ def read_families(block, wrt, grid):
         smooth = tuple(_is_continuous(s, continuous) for s in sides[inner]) if inner is not None else (False, False)
         if smooth == (True, False):
             sides, smooth = {t: (H, G) for t, (G, H) in sides.items()}, (False, True)
-        families.append(Family(_public_name(name), conditions, sides, smooth))
+        rule = _rule(sides[inner][1], rules) if smooth[1] else None
+        families.append(Family(_public_name(name), conditions, sides, smooth, rule, _contains(rule, held)))
     return families
+
+
+def _rule(side, rules):
+    """The Constraint that ties a marked variable to the states."""
+    return rules.get(side.parent_component()) if side.is_variable_type() else None
+
+
+def _contains(rule, components):
+    """Whether a Constraint over time contains variables of ``components``."""
+    data = next(iter(rule.values()), None) if rule is not None else None
+    return data is not None and any(v.parent_component() in components for v in identify_variables(data.body))
+
+
+def warn_gauss_on_curved_surfaces(families):
+    """With Gauss, a slide on a curved surface has K + 1 conditions for K multipliers (theory, section 2): say so by name."""
+    named = ComponentSet()
+    for family in families:
+        rule = family.rule
+        if rule is not None and rule not in named and any(c.body.polynomial_degree() not in (0, 1) for c in rule.values()):
+            named.add(rule)
+            logger.warning(
+                "%s: the surface is curved. LAGRANGE-LEGENDRE can cross it but not slide on it; if the solver finds no feasible "
+                "point, use LAGRANGE-RADAU.",
+                _public_name(rule.name),
+            )
 
 
 def _public_name(name):
     """A family's name as shown in reports: without time and without the package's own blocks."""
     name = strip_time(name)
     return '.'.join(part for part in name.split('.') if not part.startswith(marks.GENERATED))
-
-
-def _continuous_variables(model, wrt):
-    """Differential states, and variables that are marked as continuous."""
-    found = ComponentSet(d.get_state_var() for d in derivatives(model, wrt))
-    found.update(component for component, _ in marks.marked(model, marks.CONTINUOUS))
-    return found
 
 
 def _is_continuous(expr, continuous):

@@ -23,6 +23,8 @@ class Element:
         1..N
     stage : int
         control stage that it lies in, 1..
+    opens_stage : bool
+        whether it is the first of its control stage
     left, right : float
         boundary labels
     points : tuple of float
@@ -31,6 +33,7 @@ class Element:
 
     n: int
     stage: int
+    opens_stage: bool
     left: float
     right: float
     points: tuple
@@ -116,7 +119,7 @@ def read_grid(wrt, stages):
                 f"its labels collide at pyomo.dae's resolution of {LABEL_RESOLUTION}",
                 "scale time, e.g. write the model in milliseconds or over a horizon of length 1",
             )
-        elements.append(Element(n, bisect_right(stages, left), left, right, labels))
+        elements.append(Element(n, bisect_right(stages, left), left in stages, left, right, labels))
     return Grid(tuple(elements), tau, _quadrature(tau))
 
 

@@ -6,7 +6,13 @@ from pyomo.core import Block, Transformation, TransformationFactory
 
 from pyomo_fesd import marks, records
 from pyomo_fesd.elements.controls import check_controls, hold_controls
-from pyomo_fesd.elements.cross import FORMS, add_cross_complementarity, read_families, sources
+from pyomo_fesd.elements.cross import (
+    FORMS,
+    add_cross_complementarity,
+    read_families,
+    sources,
+    warn_gauss_on_curved_surfaces,
+)
 from pyomo_fesd.elements.equilibration import MODES, add_equilibration
 from pyomo_fesd.elements.expansion import discretise, restored_on_error
 from pyomo_fesd.elements.explicit_time import warn_explicit_time
@@ -108,9 +114,11 @@ class FiniteElements(Transformation):
         with restored_on_error(instance, wrt):
             stages = self._discretise(instance, wrt, config)
             grid = read_grid(wrt, stages)
-            families = read_families(instance, wrt, grid)
+            families = read_families(instance, wrt, config.piecewise_constant)
             integrands = [(i, integrand(i)) for i in integrals(instance.model(), wrt)]
         warn_explicit_time(instance, wrt, grid)
+        if not grid.right_is_stage:
+            warn_gauss_on_curved_surfaces(families)
 
         block = self._block(instance, wrt)
         add_lengths(block, grid, config.length_bounds)

@@ -1,0 +1,263 @@
+"""Small models with known dynamics, shared by the tests, and a few ways to look at a model."""
+
+import random
+
+import pyomo.dae as dae
+import pyomo.environ as pyo
+from pyomo.gdp import Disjunct, Disjunction
+from pyomo.mpec import Complementarity
+
+import pyomo_fesd  # noqa: F401  registers the transformations
+from pyomo_fesd.complementarity import read
+
+EVERYWHERE = (pyo.Block, Disjunct)
+
+
+# Models
+
+
+def scalar_ode(x0=-2.0, end=2.0, discretised=False):
+    """x over time, its derivative dx, and a second state y with dy; no dynamics yet."""
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, end))
+    m.x = pyo.Var(m.t, initialize=x0)
+    m.y = pyo.Var(m.t, initialize=1.0)
+    m.dx = dae.DerivativeVar(m.x)
+    m.dy = dae.DerivativeVar(m.y)
+    m.x[0].fix(x0)
+    if discretised:
+        collocate(m)
+    return m
+
+
+def add_modes(m, *modes, name='sgn'):
+    """Declare a Disjunction over time whose modes are lists of expressions, ``mode(m, t) -> [...]``."""
+    m.add_component(name, Disjunction(m.t, rule=lambda m, t: [list(mode(m, t)) for mode in modes]))
+    return m
+
+
+def below(m, t):
+    """x <= 0, dx = 3."""
+    return [m.x[t] <= 0, m.dx[t] == 3]
+
+
+def above(m, t):
+    """x >= 0, dx = 1."""
+    return [m.x[t] >= 0, m.dx[t] == 1]
+
+
+def signum(x0=-2.0, discretised=False):
+    """dx = 2 - sgn(x), with named Disjuncts over time."""
+    m = scalar_ode(x0, discretised=discretised)
+
+    @m.Disjunct(m.t)
+    def below(d, t):
+        d.region = pyo.Constraint(expr=m.x[t] <= 0)
+        d.ode = pyo.Constraint(expr=m.dx[t] == 3)
+
+    @m.Disjunct(m.t)
+    def above(d, t):
+        d.region = pyo.Constraint(expr=m.x[t] >= 0)
+        d.ode = pyo.Constraint(expr=m.dx[t] == 1)
+
+    @m.Disjunction(m.t)
+    def sgn(m, t):
+        return [m.below[t], m.above[t]]
+
+    return m
+
+
+def signum_of_lists(x0=-2.0, discretised=False):
+    """The same, the modes as lists of expressions."""
+    return add_modes(scalar_ode(x0, discretised=discretised), below, above)
+
+
+def signum_of_scalars(x0=-2.0, discretised=False):
+    """The same, with scalar Disjuncts inside a Block over time."""
+    m = scalar_ode(x0, discretised=discretised)
+
+    @m.Block(m.t)
+    def hyb(b, t):
+        b.below, b.above = Disjunct(), Disjunct()
+        b.below.region = pyo.Constraint(expr=m.x[t] <= 0)
+        b.below.ode = pyo.Constraint(expr=m.dx[t] == 3)
+        b.above.region = pyo.Constraint(expr=m.x[t] >= 0)
+        b.above.ode = pyo.Constraint(expr=m.dx[t] == 1)
+        b.sgn = Disjunction(expr=[b.below, b.above])
+
+    return m
+
+
+def units(discretised=False, where='block'):
+    """Two units 'a' and 'b', dx = 3 or 1 below and above level 0 or 1.
+
+    The modes stand in ``m.unit[i].hyb[t].dj`` ('block'), or in Disjuncts over ``(m.t, m.i)`` and a Disjunction over
+    ``(m.i, m.t)`` ('index').
+    """
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 2))
+    m.i = pyo.Set(initialize=['a', 'b'])
+    m.x = pyo.Var(m.i, m.t, initialize=-2.0)
+    m.dx = dae.DerivativeVar(m.x, wrt=m.t)
+    level = {'a': 0.0, 'b': 1.0}
+    if discretised:
+        collocate(m)
+    if where == 'index':
+
+        @m.Disjunct(m.t, m.i)
+        def below(d, t, i):
+            d.region = pyo.Constraint(expr=m.x[i, t] <= level[i])
+            d.ode = pyo.Constraint(expr=m.dx[i, t] == 3)
+
+        @m.Disjunct(m.t, m.i)
+        def above(d, t, i):
+            d.region = pyo.Constraint(expr=m.x[i, t] >= level[i])
+            d.ode = pyo.Constraint(expr=m.dx[i, t] == 1)
+
+        @m.Disjunction(m.i, m.t)
+        def sgn(m, i, t):
+            return [m.below[t, i], m.above[t, i]]
+
+        return m
+
+    @m.Block(m.i)
+    def unit(b, i):
+        @b.Block(m.t)
+        def hyb(b, t):
+            b.dj = Disjunction(
+                expr=[
+                    [m.x[i, t] <= level[i], m.dx[i, t] == 3],
+                    [m.x[i, t] >= level[i], m.dx[i, t] == 1],
+                ]
+            )
+
+    return m
+
+
+def units_by_index(discretised=False):
+    """``units`` with the unit as a further index of Disjuncts and Disjunction."""
+    return units(discretised, where='index')
+
+
+def tank(discretised=False):
+    """A liquid holdup M fed by 2; the outlet flows L and G are algebraic, only one of them at a time.
+
+    full (M >= 5): L = M/10, G = 0;   empty (M <= 5): L = 0, G = M/5.
+    """
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 4))
+    m.M = pyo.Var(m.t, initialize=8.0)
+    m.L, m.G = pyo.Var(m.t, initialize=1.0), pyo.Var(m.t, initialize=1.0)
+    m.dM = dae.DerivativeVar(m.M)
+    m.M[0].fix(8.0)
+    if discretised:
+        collocate(m)
+
+    @m.Constraint(m.t)
+    def balance(m, t):
+        return m.dM[t] == 2 - m.L[t] - m.G[t]
+
+    @m.Disjunct(m.t)
+    def full(d, t):
+        d.region = pyo.Constraint(expr=m.M[t] >= 5)
+        d.first = pyo.Constraint(expr=m.L[t] == 0.1 * m.M[t])
+        d.second = pyo.Constraint(expr=m.G[t] == 0)
+
+    @m.Disjunct(m.t)
+    def empty(d, t):
+        d.region = pyo.Constraint(expr=m.M[t] <= 5)
+        d.first = pyo.Constraint(expr=m.G[t] == 0.2 * m.M[t])
+        d.second = pyo.Constraint(expr=m.L[t] == 0)
+
+    @m.Disjunction(m.t)
+    def outlet(m, t):
+        return [m.full[t], m.empty[t]]
+
+    return m
+
+
+def thresholds(discretised=False, low=0.0, high=1.0):
+    """Three ordered modes: dx = 3 for x <= low, 2 between (a ranged inequality), 1 for x >= high."""
+    m = scalar_ode(discretised=discretised)
+    return add_modes(
+        m,
+        lambda m, t: [m.x[t] <= low, m.dx[t] == 3],
+        lambda m, t: [pyo.inequality(low, m.x[t], high), m.dx[t] == 2],
+        lambda m, t: [m.x[t] >= high, m.dx[t] == 1],
+        name='level',
+    )
+
+
+def quadrants(discretised=False):
+    """Three modes in the plane: 'left' does not say which sign y has; dx = 0 there, dx = 1 and 2 on the right."""
+    m = scalar_ode(discretised=discretised)
+    return add_modes(
+        m,
+        lambda m, t: [m.x[t] <= 0, m.dx[t] == 0],
+        lambda m, t: [m.x[t] >= 0, m.y[t] >= 0, m.dx[t] == 1],
+        lambda m, t: [m.x[t] >= 0, m.y[t] <= 0, m.dx[t] == 2],
+        name='corner',
+    )
+
+
+# Transformations
+
+
+def collocate(m, nfe=2, ncp=2):
+    """pyomo.dae's own Radau collocation."""
+    pyo.TransformationFactory('dae.collocation').apply_to(m, wrt=m.t, nfe=nfe, ncp=ncp, scheme='LAGRANGE-RADAU')
+    return m
+
+
+def dcs(m, **keywords):
+    """Apply fesd.dcs in place."""
+    pyo.TransformationFactory('fesd.dcs').apply_to(m, **keywords)
+    return m
+
+
+def finite_elements(m, nfe=2, ncp=2, **keywords):
+    """Apply fesd.finite_elements in place."""
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, wrt=m.t, nfe=nfe, ncp=ncp, **keywords)
+    return m
+
+
+# Looking at a model
+
+
+def snapshot(m):
+    """Everything that a user can see of a model: names, active flags, values, what is fixed, expressions."""
+    seen = {'points': list(m.t) if m.component('t') is not None else None}
+    for block in m.block_data_objects(descend_into=EVERYWHERE):
+        seen[block.name, 'components'] = [(c.name, c.ctype, c.active) for c in block.component_objects(descend_into=False)]
+    for data in m.component_data_objects(descend_into=EVERYWHERE):
+        seen[data.name] = getattr(data, 'active', None)
+        if data.ctype in (pyo.Var, pyo.BooleanVar, dae.DerivativeVar):
+            seen[data.name] = (data.value, data.fixed, data.stale)
+        elif data.ctype is pyo.Constraint:
+            seen[data.name] = (data.active, str(data.expr))
+    return seen
+
+
+def disjunctions(m):
+    """All DisjunctionData of a model, active or not."""
+    return list(m.component_data_objects(Disjunction, descend_into=pyo.Block))
+
+
+def generated(m, ctype):
+    """The components of one type that fesd.dcs has generated, by name."""
+    return {c.name: c for c in m.component_data_objects(ctype, descend_into=pyo.Block) if '_pyomo_fesd_dcs.' in c.name}
+
+
+def residual(constraint):
+    """body - upper of an equation at the present values."""
+    return pyo.value(constraint.body) - pyo.value(constraint.upper)
+
+
+def values_of_generated(m):
+    """Residuals and complementarity arguments that fesd.dcs generated, at variable values that depend on their names only."""
+    for v in m.component_data_objects(pyo.Var, descend_into=EVERYWHERE):
+        v.set_value(random.Random(v.name).uniform(0.5, 1.5), skip_validation=True)
+    values = {name: residual(c) for name, c in generated(m, pyo.Constraint).items()}
+    for name, condition in generated(m, Complementarity).items():
+        values[name, 'G'], values[name, 'H'] = (pyo.value(side) for side in read(condition))
+    return values
