@@ -15,16 +15,12 @@ import logging
 from collections import namedtuple
 from math import exp
 
-import matplotlib
-
-matplotlib.use('Agg')
-
-import matplotlib.pyplot as plt
 import pyomo.environ as pyo
 from idaes.core import FlowsheetBlock, MomentumBalanceType
 from idaes.models.properties.examples.saponification_reactions import SaponificationReactionParameterBlock
 from idaes.models.properties.examples.saponification_thermo import SaponificationParameterBlock
 from idaes.models.unit_models import CSTR, Mixer, MomentumMixingType
+from matplotlib.figure import Figure
 from pyomo.gdp import Disjunction
 from pyomo.network import Arc
 from pyomo.util.calc_var_value import calculate_variable_from_constraint as calculate
@@ -224,7 +220,8 @@ def reference():
 
 def draw(tables, filename):
     """Draw volume, outflow and NaOH over time (s), one column of pictures for each titled table."""
-    figure, axes = plt.subplots(3, len(tables), sharex=True, sharey='row', figsize=(10, 8))
+    figure = Figure(figsize=(10, 8), layout='constrained')
+    axes = figure.subplots(3, len(tables), sharex=True, sharey='row')
     for (title, table), (volume, outflow, naoh) in zip(tables.items(), axes.T):
         volume.set_title(title)
         volume.plot(table[VOLUME], marker='.')
@@ -235,7 +232,6 @@ def draw(tables, filename):
         axis.set_ylabel(label)
     for axis in axes.flat:
         axis.axvline(OVERFLOW_TIME, color='grey', linestyle=':')
-    figure.tight_layout()
     figure.savefig(filename, dpi=150)
 
 

@@ -9,10 +9,6 @@ Source: Nurkanovic et al. (2024), FESD; problem 'oscillator' of NOSNOC.
 
 from math import e, pi
 
-import matplotlib
-
-matplotlib.use('Agg')
-
 import pyomo.dae as dae
 import pyomo.environ as pyo
 from pyomo.gdp import Disjunction

@@ -13,7 +13,6 @@ nu, the multiplier of the mode below, is 1 before the switch and 0 after it:  dx
 Source: paper, eq. (21) and Fig. 2.  Nothing here has a unit.
 """
 
-import numpy as np
 import pyomo.dae as dae
 import pyomo.environ as pyo
 
@@ -57,15 +56,9 @@ def solve(m):
     return pyo.SolverFactory('mpec_hybrid').solve(m)
 
 
-def boundaries(m):
-    """Physical times of the element boundaries."""
-    times = pyomo_fesd.physical_time(m, m.t)
-    return np.array([times[label] for label in m.t.get_finite_elements()])
-
-
 def draw(m):
-    """x and nu over time with the elements as ticks and the switch as a dashed line (paper, Fig. 2)."""
-    figure = pyomo_fesd.plot(m, m.t, ['x', 'sgn: below'], units={'x': 'state x', 'sgn: below': 'multiplier ν of x < 0'})
+    """x and nu over time, element boundaries as grey lines and the switch as a dashed line (paper, Fig. 2)."""
+    figure = pyomo_fesd.plot(m, m.t, ['x', 'sgn: below'], units={'x': 'state x', 'sgn: below': 'multiplier ν (mode below)'})
     figure.savefig(PICTURE, dpi=150)
 
 
@@ -74,13 +67,14 @@ def main():
     m = build()
     results = solve(m)
     (switch,) = pyomo_fesd.switches(m, m.t)
-    lengths = np.diff(boundaries(m))
-    before = np.count_nonzero(boundaries(m)[1:] <= switch.time)
-
-    print(f'mpec_hybrid: {results.solver.message}, {results.solver.nlps} NLPs with {results.solver.nlp_iterations} iterations.')
-    print(f'x switches from {switch.before} to {switch.after} zero at t = {switch.time:.12f}, {switch.time - SWITCH:+.1e} off 2/3.')
+    elements = pyomo_fesd.element_lengths(m, m.t)
+    before = int((elements['end'] <= switch.time).sum())
+    first, last = elements['length'].iloc[[0, -1]]
+    work = f'{results.solver.nlps} NLPs with {results.solver.nlp_iterations} iterations'
+    print(f'mpec_hybrid: {results.solver.reason}; {work}.')
+    print(f'x goes from {switch.before} to {switch.after} zero at t = {switch.time:.12f}, {switch.time - SWITCH:+.1e} off 2/3.')
     print(f'x(2) = {m.x[END].value:.12f}, {m.x[END].value - FINAL:+.1e} off 4/3.')
-    print(f'The switch is a boundary: {before} elements of length {lengths[0]:.6f} before it, {ELEMENTS - before} of {lengths[-1]:.6f} after.')
+    print(f'Before the switch lie {before} elements of length {first:.6f}, after it {ELEMENTS - before} of {last:.6f}.')
     draw(m)
     print(f'x and nu over time: {PICTURE}')
 

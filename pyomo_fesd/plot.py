@@ -6,11 +6,11 @@ from matplotlib.figure import Figure
 from pyomo_fesd.elements.grid import read_grid
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import find_continuous_set
-from pyomo_fesd.trajectory import physical_time, switches, trajectory
+from pyomo_fesd.trajectory import element_lengths, switches, trajectory
 
 
 def plot(model, wrt=None, names=None, units=None):
-    """Draw trajectories, one panel each, element boundaries as ticks below and switches as dashed lines.
+    """Draw trajectories, one panel each, element boundaries as light lines and switches as dashed ones.
 
     Parameters
     ----------
@@ -34,8 +34,7 @@ def plot(model, wrt=None, names=None, units=None):
     frame = trajectory(model, wrt)
     names = names or [c for c in frame.columns if c not in ('label', 'element')]
     groups = [(name, _columns(frame, name)) for name in names]
-    times = physical_time(model, wrt)
-    boundaries = [times[label] for label in wrt.get_finite_elements()]
+    boundaries = element_lengths(model, wrt)['end']
     figure = Figure(figsize=(7, 1 + 1.9 * len(groups)), layout='constrained')
     axes = np.atleast_1d(figure.subplots(len(groups), 1, sharex=True))
     for axis, (name, columns) in zip(axes, groups):
@@ -46,7 +45,8 @@ def plot(model, wrt=None, names=None, units=None):
             axis.legend(fontsize='small')
         for switch in switches(model, wrt):
             axis.axvline(switch.time, color='0.4', linestyle='--', linewidth=0.8)
-        axis.plot(boundaries, np.zeros(len(boundaries)), '|', color='0.5', markersize=5, transform=axis.get_xaxis_transform())
+        for boundary in boundaries:
+            axis.axvline(boundary, color='0.9', linewidth=0.6, zorder=0)
         axis.margins(x=0.01)
     axes[-1].set_xlabel(wrt.local_name)
     return figure

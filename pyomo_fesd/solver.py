@@ -2,6 +2,7 @@
 
 import datetime
 import time
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -43,8 +44,10 @@ from pyomo_fesd.mpcc.table import Table
 #: What each outcome is in Pyomo's words.
 CONDITIONS = {
     Outcome.CERTIFIED: (TerminationCondition.convergenceCriteriaSatisfied, SolutionStatus.optimal),
+    Outcome.SOLVED: (TerminationCondition.convergenceCriteriaSatisfied, SolutionStatus.optimal),
     Outcome.FEASIBLE: (TerminationCondition.unknown, SolutionStatus.feasible),
     Outcome.INFEASIBLE: (TerminationCondition.locallyInfeasible, SolutionStatus.infeasible),
+    Outcome.UNBOUNDED: (TerminationCondition.unbounded, SolutionStatus.unknown),
     Outcome.TIME_LIMIT: (TerminationCondition.maxTimeLimit, SolutionStatus.unknown),
     Outcome.ITERATION_LIMIT: (TerminationCondition.iterationLimit, SolutionStatus.unknown),
     Outcome.INTERRUPTED: (TerminationCondition.interrupted, SolutionStatus.unknown),
@@ -184,7 +187,8 @@ class MpecHybrid(SolverBase):
         compiled = compile_problem(problem, timer)
         timer.stop('compile')
         table = Table(config.tee, compiled)
-        run = HybridSolver(compiled, config, timer, table.row).solve()
+        deadline = None if config.time_limit is None else started + config.time_limit
+        run = HybridSolver(compiled, config, timer, table.row, deadline).solve()
         _fill(results, model, compiled, run)
         results.solver_config = config
         results.timing_info.timer = timer
@@ -305,11 +309,14 @@ def certify(model, **options):
     Returns
     -------
     Certificate
-        with ``certified``, ``grade`` (a sentence), ``value`` of the LPEC and the residuals
+        with ``certified``, ``grade`` (a sentence), the residuals, ``value`` of the LPEC and its ``direction`` by variable
     """
     config = MpecHybrid.CONFIG(value=options)
     compiled = compile_problem(read_problem(model), HierarchicalTimer())
     tolerances = Tolerances(
         config.feasibility_tol, config.biactive_tol, config.descent_tol, config.eta_tol, config.trust_radius
     )
-    return certify_point(compiled, Lpec(compiled, config.lpec_options.value()), compiled.x0, tolerances)
+    certificate = certify_point(compiled, Lpec(compiled, config.lpec_options.value()), compiled.x0, tolerances)
+    if certificate.lpec is None:
+        return certificate
+    return replace(certificate, direction=ComponentMap(zip(compiled.variables, map(float, certificate.lpec.d))))

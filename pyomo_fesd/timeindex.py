@@ -89,6 +89,18 @@ def strip_time(name):
     return name
 
 
+def refuse_foreign(variables, model, where):
+    """Refuse variables of another model: a rule that closes over ``m`` still means ``m`` when a clone of it is expanded."""
+    for component in ComponentMap((v.parent_component(), v) for v in variables):
+        if component.model() is not model:
+            raise FesdError(
+                where,
+                f"it refers to '{component.name}' of another model (of which this one is perhaps a clone)",
+                "let rules take components from their own argument, e.g. d.model().x[t] instead of m.x[t], or transform before "
+                "cloning",
+            )
+
+
 def find_continuous_set(block, wrt, caller):
     """The ContinuousSet that ``caller`` is to work on: ``wrt`` checked, or the only one below or above ``block``.
 

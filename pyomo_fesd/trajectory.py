@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from pyomo.common.collections import ComponentMap
-from pyomo.core import Block, Var, value
+from pyomo.core import Block, Expression, Var, value
 from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity
 
@@ -67,10 +67,24 @@ def _grid(wrt):
     return read_grid(wrt, [wrt.first(), wrt.last()])
 
 
-def trajectory(model, wrt=None):
-    """Every variable over time on physical time.
+def element_lengths(model, wrt=None):
+    """Where each finite element begins and ends on physical time.
 
-    Variables are named without their time index (``x``, ``unit.F[a]``); each Disjunction adds the multipliers of its modes
+    Returns
+    -------
+    pandas.DataFrame, index ``element`` (1..N), columns ``start``, ``end``, ``length`` (h_n of theory, eq. 10)
+    """
+    wrt = find_continuous_set(model, wrt, 'element_lengths')
+    times, elements = physical_time(model, wrt), _grid(wrt).elements
+    start, end = ([times[label] for label in labels] for labels in ((e.left for e in elements), (e.right for e in elements)))
+    index = pd.Index([e.n for e in elements], name='element')
+    return pd.DataFrame({'start': start, 'end': end, 'length': np.subtract(end, start)}, index=index)
+
+
+def trajectory(model, wrt=None):
+    """Every variable and named expression over time on physical time.
+
+    They are named without their time index (``x``, ``unit.F[a]``); each Disjunction adds the multipliers of its modes
     (``sgn: below``), 1 where the mode is active, 0 where it is not, between in a sliding mode.  The columns ``element`` and
     ``label`` tell where a row comes from.
 
@@ -81,7 +95,8 @@ def trajectory(model, wrt=None):
     wrt = find_continuous_set(model, wrt, 'trajectory')
     times = physical_time(model, wrt)
     index = TimeIndex(wrt)
-    owned = (v for v in model.component_objects(Var, descend_into=Block) if not v.is_reference() and not marks.is_generated(v))
+    found = model.component_objects((Var, Expression), descend_into=Block)
+    owned = (v for v in found if not v.is_reference() and not marks.is_generated(v))
     families = index.families(data for v in owned for data in v.values())
     columns = {'label': list(times), 'element': _elements(wrt, times)}
     for name, values in families.items():

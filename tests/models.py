@@ -4,6 +4,7 @@ import random
 
 import pyomo.dae as dae
 import pyomo.environ as pyo
+from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
@@ -261,3 +262,146 @@ def values_of_generated(m):
     for name, condition in generated(m, Complementarity).items():
         values[name, 'G'], values[name, 'H'] = (pyo.value(side) for side in read(condition))
     return values
+
+
+def solution(constraint, v):
+    """The value of ``v`` that satisfies an equation linear in it, the other variables at their present values."""
+    kept = v.value
+    v.set_value(0.0, skip_validation=True)
+    at_0 = residual(constraint)
+    v.set_value(1.0, skip_validation=True)
+    factor = residual(constraint) - at_0
+    v.set_value(-at_0 / factor, skip_validation=True)
+    # once more from there: the factor is inexact where the equation has large terms
+    answer = v.value - residual(constraint) / factor
+    v.set_value(kept, skip_validation=True)
+    return answer
+
+
+# The conditions of a transformed Disjunction, solved for its multipliers
+
+
+def form_of(disjunction):
+    """The block that holds the form of a transformed DisjunctionData, and the index in it as a tuple."""
+    index = disjunction.index()
+    block = next(d.transformation_block for d in disjunction.disjuncts if d.transformation_block is not None)
+    return block, () if index is None else index if isinstance(index, tuple) else (index,)
+
+
+def put_on(disjunction, pair):
+    """Set the multipliers as eq. (3) or (5) ask at the present states, with nu = 1 on region number ``pair``."""
+    block, index = form_of(disjunction)
+    now = index or None
+    if block.component('mu') is None:
+        block.n[now].value = 0
+        c = solution(block.switching[now], block.p[now])
+        block.p[now].value, block.n[now].value = max(c, 0), max(-c, 0)
+        block.nu[now].value = 2 - pair
+        return
+    block.mu[now].value = 0
+    g = {k: solution(block.stationarity[(*index, k)], block.lam[(*index, k)]) for k in block.regions}
+    block.mu[now].value = min(g.values())
+    for k in block.regions:
+        block.lam[(*index, k)].value = g[k] - min(g.values())
+        block.nu[(*index, k)].value = float(k == pair)
+
+
+def violation(disjunction):
+    """Largest violation of a form's equations (without the mode equations) and pairs at the present values."""
+    block, index = form_of(disjunction)
+    found = []
+    for name in ('switching', 'stationarity', 'simplex'):
+        for key, con in (block.component(name) or {}).items():
+            if _starts(key, index):
+                found.append(abs(residual(con)))
+    for key, condition in block.complementarity.items():
+        if _starts(key, index):
+            G, H = map(pyo.value, read(condition))
+            found.append(max(-G, -H, min(G, H)))
+    return max(found)
+
+
+def _starts(key, index):
+    key = key if isinstance(key, tuple) else (key,)
+    return not index or key[: len(index)] == index
+
+
+def modes_on(disjunction, tolerance=1e-7):
+    """The disjuncts whose multiplier may be 1 at the present states; the multipliers are left at the last of them."""
+    block, index = form_of(disjunction)
+    source = pyo.TransformationFactory('fesd.dcs').get_src_disjunct
+    count = sum(_starts(key, index) for key in block.complementarity)
+    allowed = []
+    for pair in range(1, count + 1):
+        put_on(disjunction, pair)
+        if violation(disjunction) <= tolerance:
+            allowed.append(pair)
+    if allowed:
+        put_on(disjunction, allowed[-1])
+    owners = [source(block.complementarity[(*index, pair)]) for pair in allowed]
+    return [d for d in disjunction.disjuncts if any(d is owner for owner in owners)]
+
+
+def rate(disjunction, v):
+    """The value that the mode equations of a transformed DisjunctionData give ``v`` at the present values."""
+    block, index = form_of(disjunction)
+    (con,) = [
+        con
+        for key, con in block.mode.items()
+        if _starts(key, index) and any(w is v for w in identify_variables(con.body, include_fixed=True))
+    ]
+    return solution(con, v)
+
+
+# Random systems in the plane
+
+
+def planar(functions, modes, x0=1.0, y0=1.0):
+    """A switching system in the (x, y) plane with affine switching functions.
+
+    Parameters
+    ----------
+    functions : list of (a, b, c)
+        switching functions a*x + b*y + c
+    modes : list of dict
+        ``signs`` (one of +1, -1, 0 for each function; 0 leaves it open), ``rates`` ((r, s): dx = r + s*y, dy = s - r*x),
+        ``factors`` (one positive number for each inequality), ``writing`` (number of a writing of inequality and equation)
+    """
+    m = scalar_ode(x0)
+    m.x[0].unfix()
+    m.y[...].set_value(y0)
+
+    def inequality(c, sign, factor, writing, t):
+        linear, constant = sign * factor * (c[0] * m.x[t] + c[1] * m.y[t]), sign * factor * c[2]
+        return (linear >= -constant, linear + constant >= 0, -constant - linear <= 0, 2 * linear >= linear - constant)[writing]
+
+    def equations(rates, writing, t):
+        r, s = rates
+        dx, dy, f, g = m.dx[t], m.dy[t], r + s * m.y[t], s - r * m.x[t]
+        return ([dx == f, dy == g], [2 * g == 2 * dy, f - dx == 0], [dx + dy == f + g, dx - dy == f - g], [-3 * dy == -3 * g, dx == f])[
+            writing
+        ]
+
+    def mode(signs, rates, factors, writing):
+        def write(m, t):
+            stated = [
+                inequality(c, sign, factor, writing, t) for c, sign, factor in zip(functions, signs, factors) if sign
+            ]
+            return stated + equations(rates, writing, t)
+
+        return write
+
+    return add_modes(m, *(mode(**k) for k in modes))
+
+
+def rates_of(mode, x, y):
+    """dx and dy of one mode of ``planar``."""
+    r, s = mode['rates']
+    return [r + s * y, s - r * x]
+
+
+def owner(functions, modes, x, y):
+    """Number of the mode of ``planar`` whose region holds the point."""
+    c = [a * x + b * y + const for a, b, const in functions]
+    (number,) = [i for i, mode in enumerate(modes) if all(sign * c_k >= 0 for sign, c_k in zip(mode['signs'], c))]
+    return number

@@ -30,7 +30,7 @@ def declare(block, index, regions):
     block.regions = RangeSet(regions)
     block.nu = Var(*index, block.regions, dense=False, bounds=(0, 1))
     block.lam = Var(*index, block.regions, dense=False, bounds=(0, None))
-    block.mu = Var(*index, dense=False)
+    block.mu = Var(*index, **({'dense': False} if index else {}))
     block.stationarity = Constraint(*index, block.regions)
     block.simplex = Constraint(*index)
     block.complementarity = Complementarity(*index, block.regions)

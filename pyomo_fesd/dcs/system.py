@@ -12,6 +12,7 @@ from pyomo.mpec import Complementarity
 from pyomo_fesd.dcs.modes import ModeEquations, read_equations
 from pyomo_fesd.dcs.regions import Regions, read_regions
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.timeindex import refuse_foreign
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,9 @@ class Reader:
         if len(modes) == 1:
             return System(disjunction, modes, None, None)
         split = [_constraints(d) for d in modes]
+        for disjunct, (equalities, inequalities) in zip(modes, split):
+            mentioned = (v for c in (*equalities, *inequalities) for v in identify_variables(c.body))
+            refuse_foreign(mentioned, disjunction.model(), disjunct)
         self._refuse_derivatives_in_regions(modes, split)
         source = disjunction.parent_component()
         choice, patterns = self._choices.setdefault(source, {}), self._patterns.setdefault(source, {})

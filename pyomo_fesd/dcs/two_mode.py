@@ -30,9 +30,10 @@ def size(system):
 
 def declare(block, index):
     """Declare the components of the form over ``index`` (a tuple of sets, empty for a scalar Disjunction)."""
-    block.nu = Var(*index, dense=False, bounds=(0, 1))
-    block.p = Var(*index, dense=False, bounds=(0, None))
-    block.n = Var(*index, dense=False, bounds=(0, None))
+    sparse = {'dense': False} if index else {}
+    block.nu = Var(*index, **sparse, bounds=(0, 1))
+    block.p = Var(*index, **sparse, bounds=(0, None))
+    block.n = Var(*index, **sparse, bounds=(0, None))
     block.switching = Constraint(*index)
     block.complementarity = Complementarity(*index, [1, 2])
     marks.mark(block, marks.SELECTOR, block.nu)

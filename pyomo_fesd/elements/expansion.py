@@ -65,8 +65,15 @@ def discretise(block, wrt, nfe, ncp, scheme):
     with restored_on_error(block, wrt):
         inputs = _fixed_everywhere(block, wrt)
         place_boundaries(wrt, nfe)
-        with hybrid_expansion(block, wrt):
-            TransformationFactory('dae.collocation').apply_to(block, wrt=wrt, nfe=nfe, ncp=ncp, scheme=scheme)
+        try:
+            with hybrid_expansion(block, wrt):
+                TransformationFactory('dae.collocation').apply_to(block, wrt=wrt, nfe=nfe, ncp=ncp, scheme=scheme)
+        except KeyError as error:
+            raise FesdError(
+                wrt,
+                f"a rule failed at a new time: {error}",
+                "if this model is a clone, its rules may still refer to the original: use d.model().x[t] instead of m.x[t]",
+            ) from error
     _warn_unfixed(inputs)
 
 

@@ -21,6 +21,7 @@ from scipy import sparse
 
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.mpcc.problem import Condition
+from pyomo_fesd.timeindex import refuse_foreign
 
 #: Nodes that casadi's NL reader cannot evaluate.
 UNSUPPORTED_NODES = (ExternalFunctionExpression, Expr_ifExpression)
@@ -100,6 +101,7 @@ def compile_problem(problem, timer):
             with open(path, 'w', newline='') as stream:
                 info = _write(problem.model, stream)
             timer.stop('write')
+            refuse_foreign(info.variables, problem.model.model(), problem.model)
             timer.start('import')
             nl = _import(problem.model, path)
         compiled = _assemble(problem, conditions, rows, info, nl)

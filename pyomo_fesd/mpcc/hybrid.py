@@ -21,6 +21,10 @@ from pyomo_fesd.mpcc.stationarity import Stationarity, certify
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
+#: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
+BIACTIVE = 3.0
+#: A feasible point with variables beyond this has run away along an unbounded objective.
+UNBOUNDED = 1e15
 #: After a failed relaxation: eps relative to its first value, and whether to start again from the model's values.
 RECOVERY = ((1e-2, True), (10.0, False), (1e-4, True), (100.0, True))
 
@@ -29,8 +33,10 @@ class Outcome(Enum):
     """How a run ended; the value is the sentence for the user."""
 
     CERTIFIED = "B-stationary point found and certified"
+    SOLVED = "exactly complementary solution found; there is no objective to minimise"
     FEASIBLE = "feasible, exactly complementary point found, not certified"
     INFEASIBLE = "no feasible point found: the problem is locally infeasible"
+    UNBOUNDED = "the objective falls without bound along feasible points"
     TIME_LIMIT = "time limit reached"
     ITERATION_LIMIT = "iteration limit reached"
     INTERRUPTED = "interrupted"
@@ -129,11 +135,12 @@ class HybridSolver:
     timer : HierarchicalTimer
     show : callable Step -> None
         called after each NLP and LPEC
+    deadline : float or None
+        value of ``time.perf_counter()`` at which to stop
     """
 
-    def __init__(self, compiled, options, timer, show):
-        self._c, self._options, self._timer, self._show = compiled, options, timer, show
-        self._deadline = None if options.time_limit is None else time.perf_counter() + options.time_limit
+    def __init__(self, compiled, options, timer, show, deadline=None):
+        self._c, self._options, self._timer, self._show, self._deadline = compiled, options, timer, show, deadline
         self._tolerances = Tolerances(
             options.feasibility_tol, options.biactive_tol, options.descent_tol, options.eta_tol, options.trust_radius
         )
@@ -141,9 +148,9 @@ class HybridSolver:
         timer.start('build')
         sides = sort_sides(compiled)
         budget = {'max_iter': options.relaxation_iterations, 'tol': options.relaxation_tol}
-        self._relaxation = RELAXATIONS[options.relaxation](compiled, sides, budget | ipopt, self._deadline)
+        self._relaxation = RELAXATIONS[options.relaxation](compiled, sides, budget | ipopt, deadline)
         budget = {'max_iter': options.branch_iterations, 'tol': options.branch_tol}
-        self._branch = Branch(compiled, sides, budget | ipopt, self._deadline)
+        self._branch = Branch(compiled, sides, budget | ipopt, deadline)
         timer.stop('build')
         self._lpec = Lpec(compiled, options.lpec_options.value())
         self._tried = {}
@@ -167,7 +174,9 @@ class HybridSolver:
         point = self.run.point
         if point is None:
             return Outcome.INFEASIBLE
-        return Outcome.CERTIFIED if point.certificate.certified else Outcome.FEASIBLE
+        if not point.certificate.certified:
+            return Outcome.FEASIBLE
+        return Outcome.CERTIFIED if self._c.has_objective else Outcome.SOLVED
 
     # the homotopy
 
@@ -211,8 +220,8 @@ class HybridSolver:
             self.run.w = w
 
     def _biactive(self, at):
-        """Below this both sides of a pair may be zero at the solution: O(sqrt) of the largest product left."""
-        return max(np.sqrt(np.max(at.G * at.H, initial=0.0)), self._tolerances.biactive)
+        """Below this both sides of a pair may be zero at the solution: O(sqrt) of the largest product left (eq. 16)."""
+        return max(BIACTIVE * np.sqrt(np.max(at.G * at.H, initial=0.0)), self._tolerances.biactive)
 
     def _settled(self, f_relaxed):
         """Gap test: the incumbent is good enough if the relaxed objective no longer lies clearly below it."""
@@ -257,6 +266,8 @@ class HybridSolver:
         certificate = self._certify(solved.w, equal)
         if not certificate.feasible:
             return None
+        if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
+            raise _Stop(Outcome.UNBOUNDED)
         return Point(solved, self._c.evaluate(solved.w).f, certificate)
 
     def _solve_branch(self, w, zero):

@@ -2,8 +2,10 @@
 
 import io
 import logging
+import signal
+import threading
 import time
-from contextlib import redirect_stderr
+from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass
 
 import casadi as ca
@@ -23,7 +25,6 @@ IPOPT = {
     'sb': 'yes',
 }
 SOLVED = ('Solve_Succeeded', 'Solved_To_Acceptable_Level', 'Feasible_Point_Found')
-STOPPED_BY_USER = 'User_Requested_Stop'
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,27 @@ class NlpResult:
     def solved(self):
         """Whether Ipopt reports a stationary, feasible point."""
         return self.status in SOLVED
+
+
+@contextmanager
+def _interruptible():
+    """Let Ctrl-C through: casadi turns it into an Ipopt status, so it is remembered here and raised again afterwards."""
+    pressed = []
+
+    def remember(*args):
+        pressed.append(True)
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, remember)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if pressed:
+        raise KeyboardInterrupt
 
 
 class _Deadline(ca.Callback):
@@ -92,7 +114,7 @@ class Nlp:
     def solve(self, w0, p, lbx, ubx, lbg, ubg):
         """Solve from ``w0``; never raises for an unsolved problem, the status says it."""
         said = io.StringIO()
-        with redirect_stderr(said):
+        with redirect_stderr(said), _interruptible():
             result = self._solver(x0=w0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
         if said.getvalue():
             logger.debug("casadi: %s", said.getvalue())

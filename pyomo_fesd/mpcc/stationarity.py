@@ -16,7 +16,7 @@ class Stationarity(Enum):
     """What is known of the point; the value is the sentence for the user."""
 
     B = "B-stationary: certified by the LPEC, no branch descends"
-    SQUARE = "feasible, and there is no objective: nothing to descend"
+    FEASIBLE = "feasible, and there is no objective: nothing to descend"
     DESCENT = "not certified: the LPEC found a direction of descent"
     UNSOLVED = "not certified: HiGHS did not solve the LPEC"
     INFEASIBLE = "not certified: the point is not feasible"
@@ -38,6 +38,8 @@ class Certificate:
         largest violation of rows and bounds; largest min(G_i, H_i), negative sides counted
     violation_scaled, complementarity_scaled : float
         the same, each row divided by max(1, its gradient's largest entry)
+    direction : ComponentMap or None
+        d of the LPEC by variable, where a model asks for it
     """
 
     grade: Stationarity
@@ -48,11 +50,12 @@ class Certificate:
     complementarity: float
     violation_scaled: float
     complementarity_scaled: float
+    direction: object = None
 
     @property
     def certified(self):
         """Whether the point is B-stationary (or feasible, where there is nothing to minimise)."""
-        return self.grade in (Stationarity.B, Stationarity.SQUARE)
+        return self.grade in (Stationarity.B, Stationarity.FEASIBLE)
 
     @property
     def feasible(self):
@@ -88,7 +91,8 @@ def certify(c, lpec, w, tolerances, equal=None):
     if max(scaled, gap_scaled) > tolerances.feasibility:
         return Certificate(Stationarity.INFEASIBLE, 0.0, None, *measures)
     if not grad.any():
-        return Certificate(Stationarity.SQUARE, 0.0, None, *measures)
+        # nothing descends where f is flat: no LPEC is needed
+        return Certificate(Stationarity.B if c.has_objective else Stationarity.FEASIBLE, 0.0, None, *measures)
     if equal is None:
         equal = at.eta > tolerances.eta
     result = lpec.solve(w, sets, tolerances.radius, equal)

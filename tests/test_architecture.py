@@ -1,0 +1,44 @@
+"""The import law of the design, and the public names."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import pyomo_fesd
+
+PACKAGE = Path(pyomo_fesd.__file__).parent
+ROOMS = ('dcs', 'elements', 'mpcc')
+
+
+def imports(path):
+    """Modules of the package that a file imports."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        names = [node.module] if isinstance(node, ast.ImportFrom) else [a.name for a in getattr(node, 'names', [])]
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield from (n for n in names if n and n.startswith('pyomo_fesd.'))
+
+
+@pytest.mark.parametrize('room', ROOMS)
+def test_rooms_import_nothing_from_each_other(room):
+    others = tuple(f'pyomo_fesd.{other}' for other in ROOMS if other != room)
+    for path in (PACKAGE / room).glob('*.py'):
+        assert not [n for n in imports(path) if n.startswith(others)], path
+
+
+def test_only_the_solver_imports_mpcc():
+    users = {p.name for p in PACKAGE.glob('*.py') if any(n.startswith('pyomo_fesd.mpcc') for n in imports(p))}
+    assert users == {'solver.py'}
+
+
+def test_public_names():
+    assert sorted(pyomo_fesd.__all__) == [
+        'FesdError',
+        'certify',
+        'element_lengths',
+        'physical_time',
+        'plot',
+        'report',
+        'switches',
+        'trajectory',
+    ]

@@ -1,0 +1,245 @@
+"""mpec_hybrid as a Pyomo solver: options, results, log, limits, refusals."""
+
+import io
+import os
+import signal
+import threading
+
+import oscillator
+import pyomo.environ as pyo
+import pytest
+from problems import small_mpccs
+from pyomo.contrib.solver.common.factory import SolverFactory as SolverFactoryV2
+from pyomo.contrib.solver.common.results import SolutionStatus, TerminationCondition
+from pyomo.contrib.solver.common.util import NoOptimalSolutionError
+from pyomo.gdp import Disjunction
+from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd import FesdError
+
+
+def toy():
+    return small_mpccs.toy(0.0, 0.0)[0]
+
+
+def big_oscillator():
+    m = oscillator.build()
+    pyo.TransformationFactory('fesd.dcs').apply_to(m)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=300, ncp=3)
+    return m
+
+
+def test_both_interfaces_give_the_same_answer():
+    legacy, new = toy(), toy()
+    results = pyo.SolverFactory('mpec_hybrid').solve(legacy)
+    results_v2 = SolverFactoryV2('mpec_hybrid').solve(new)
+    assert pyo.check_optimal_termination(results)
+    assert results_v2.termination_condition is TerminationCondition.convergenceCriteriaSatisfied
+    assert results_v2.solution_status is SolutionStatus.optimal
+    assert results_v2.incumbent_objective == pytest.approx(1)
+    assert pyo.value(legacy.f) == pytest.approx(pyo.value(new.f))
+
+
+def test_results_tell_what_was_done():
+    info = SolverFactoryV2('mpec_hybrid').solve(toy()).extra_info
+    assert info.stationarity == 'B'
+    assert info.pairs == 1
+    assert info.nlps >= 2 and info.nlp_iterations > 0 and info.lpecs >= 1
+    assert info.complementarity <= 1e-9 and info.violation <= 1e-9
+    assert info.complementarity_scaled <= 1e-9 and info.violation_scaled <= 1e-9
+    assert info.biactive_pairs == 0
+    assert len(info.steps) >= info.nlps
+
+
+def test_time_is_told_by_phase():
+    timer = SolverFactoryV2('mpec_hybrid').solve(toy()).timing_info.timer
+    assert {'compile', 'build', 'relaxation', 'branch', 'lpec'} <= set(timer.timers)
+
+
+@pytest.mark.parametrize(
+    'solve',
+    [
+        lambda m: pyo.SolverFactory('mpec_hybrid', eps_init=1e-3).solve(m),
+        lambda m: pyo.SolverFactory('mpec_hybrid').solve(m, options={'eps_init': 1e-3}),
+        lambda m: pyo.SolverFactory('mpec_hybrid').solve(m, eps_init=1e-3),
+        lambda m: SolverFactoryV2('mpec_hybrid').solve(m, eps_init=1e-3),
+        lambda m: SolverFactoryV2('mpec_hybrid').solve(m, solver_options={'eps_init': 1e-3}),
+    ],
+)
+def test_every_way_to_give_an_option_works(solve):
+    results = solve(toy())
+    steps = results.extra_info.steps if hasattr(results, 'extra_info') else results.solver.steps
+    assert steps[0].eps == pytest.approx(1e-3)
+
+
+def test_options_can_be_set_on_config():
+    solver = pyo.SolverFactory('mpec_hybrid')
+    solver.config.eps_init = 1e-3
+    assert solver.solve(toy()).solver.steps[0].eps == pytest.approx(1e-3)
+
+
+def test_options_of_one_call_do_not_outlive_it():
+    solver = pyo.SolverFactory('mpec_hybrid')
+    solver.solve(toy(), options={'eps_init': 1e-3})
+    assert solver.solve(toy()).solver.steps[0].eps == pytest.approx(1.0)
+
+
+def test_unknown_option_is_named():
+    with pytest.raises(FesdError, match='unknown option.*no_such_thing'):
+        pyo.SolverFactory('mpec_hybrid').solve(toy(), options={'no_such_thing': 1})
+
+
+def test_options_reach_ipopt():
+    results = SolverFactoryV2('mpec_hybrid').solve(
+        toy(), nlp_options={'max_iter': 1}, raise_exception_on_nonoptimal_result=False
+    )
+    assert max(step.iterations for step in results.extra_info.steps) <= 1
+
+
+def test_tee_prints_a_table_one_line_a_step(capsys):
+    results = pyo.SolverFactory('mpec_hybrid').solve(toy(), tee=True)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == 'mpec_hybrid: 2 variables, 0 constraints, 1 pairs'
+    assert lines[1].split()[:3] == ['step', 'what', 'eps']
+    assert len(lines) == 2 + len(list(results.solver.steps)) + 2
+    assert 'B-stationary point found and certified' in lines[-2]
+
+
+def test_without_tee_nothing_is_printed(capfd):
+    pyo.SolverFactory('mpec_hybrid').solve(toy())
+    assert capfd.readouterr() == ('', '')
+
+
+def test_tee_goes_to_a_stream_too():
+    stream = io.StringIO()
+    SolverFactoryV2('mpec_hybrid').solve(toy(), tee=stream)
+    assert 'certificate' in stream.getvalue()
+
+
+def test_solution_is_loaded_only_when_asked():
+    m = toy()
+    results = SolverFactoryV2('mpec_hybrid').solve(m, load_solutions=False)
+    assert (m.x.value, m.y.value) == (0.0, 0.0)
+    results.solution_loader.load_solution()
+    assert pyo.value(m.f) == pytest.approx(1)
+
+
+def test_duals_are_those_of_the_branch():
+    m = toy()
+    m.k = pyo.Constraint(expr=m.x + m.y <= 0.5)
+    m.dual = pyo.Suffix(direction=pyo.Suffix.IMPORT)
+    pyo.SolverFactory('mpec_hybrid').solve(m)
+    # f falls by 1 for each unit of the bound: d/dx (x - 1)^2 at 1/2
+    assert m.dual[m.k] == pytest.approx(-1.0)
+
+
+def test_same_model_can_be_solved_again_with_other_data():
+    m = toy()
+    m.goal = pyo.Param(initialize=1.0, mutable=True)
+    m.del_component(m.f)
+    m.f = pyo.Objective(expr=(m.x - m.goal) ** 2 + (m.y - 0.1) ** 2)
+    solver = pyo.SolverFactory('mpec_hybrid')
+    solver.solve(m)
+    assert m.x.value == pytest.approx(1)
+    m.goal = 3.0
+    solver.solve(m)
+    assert m.x.value == pytest.approx(3)
+    assert set(m.component_map()) == {'x', 'y', 'c', 'goal', 'f'}
+
+
+def test_infeasible_raises_in_the_new_interface_with_the_names():
+    m = toy()
+    m.k = pyo.Constraint(expr=m.x + m.y >= 1)
+    m.e = pyo.Constraint(expr=m.x == m.y)
+    with pytest.raises(NoOptimalSolutionError, match=r'infeasible.*largest violations: c'):
+        SolverFactoryV2('mpec_hybrid').solve(m)
+
+
+def test_time_limit_is_told_and_nothing_is_left_behind():
+    m = big_oscillator()
+    names = set(m.component_map())
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, timelimit=0.01)
+    assert results.solver.termination_condition == pyo.TerminationCondition.maxTimeLimit
+    assert set(m.component_map()) == names
+
+
+def test_iteration_limit_is_told():
+    results = pyo.SolverFactory('mpec_hybrid').solve(big_oscillator(), max_iterations=3)
+    assert results.solver.termination_condition == pyo.TerminationCondition.maxIterations
+
+
+def test_ctrl_c_during_an_nlp_ends_with_a_result():
+    m = big_oscillator()
+    names = set(m.component_map())
+    pressed = threading.Event()
+
+    class PressWhenTheTableBegins(io.StringIO):
+        def write(self, text):
+            if 'step' in text and not pressed.is_set():
+                pressed.set()
+                threading.Timer(0.9, os.kill, (os.getpid(), signal.SIGINT)).start()
+            return super().write(text)
+
+    options = {'relaxation_iterations': 100000, 'relaxation_tol': 1e-300}
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, tee=PressWhenTheTableBegins(), options=options)
+    assert results.solver.termination_condition == pyo.TerminationCondition.resourceInterrupt
+    assert set(m.component_map()) == names
+
+
+def disjunction(m):
+    m.d = Disjunction(expr=[[m.x <= 1], [m.x >= 2]])
+
+
+def logic(m):
+    m.b = pyo.BooleanVar([1, 2])
+    m.logic = pyo.LogicalConstraint(expr=pyo.lor(m.b[1], m.b[2]))
+
+
+def integer(m):
+    m.n = pyo.Var(domain=pyo.Integers, initialize=1)
+    m.k = pyo.Constraint(expr=m.n <= 3)
+
+
+def sos(m):
+    m.v = pyo.Var([1, 2], initialize=0)
+    m.s = pyo.SOSConstraint(var=m.v, sos=1)
+
+
+def second_objective(m):
+    m.f2 = pyo.Objective(expr=m.x)
+
+
+def three_bounds(m):
+    m.c2 = Complementarity(expr=complements(pyo.inequality(0, m.x + m.y, 1), pyo.inequality(0, m.x - m.y, 1)))
+
+
+@pytest.mark.parametrize(
+    'spoil, name',
+    [(disjunction, 'd'), (logic, 'logic'), (integer, 'n'), (sos, 's'), (second_objective, 'f2'), (three_bounds, 'c2')],
+)
+def test_what_is_no_mpcc_is_refused_by_name_and_left_as_it_was(spoil, name):
+    m = toy()
+    spoil(m)
+    names = set(m.component_map())
+    with pytest.raises(FesdError, match=rf'^{name}.*\n    Fix: '):
+        pyo.SolverFactory('mpec_hybrid').solve(m)
+    assert set(m.component_map()) == names
+    assert m.c.active
+
+
+@pytest.mark.parametrize(
+    'condition',
+    [
+        lambda m: complements(m.x, m.y),
+        lambda m: complements(m.x >= 0, m.y),
+        lambda m: complements(m.x, m.y >= 0),
+        lambda m: complements(0 <= m.x, 0 <= m.y),
+        lambda m: complements(-m.x <= 0, m.y + 1 >= 1),
+    ],
+)
+def test_conditions_as_people_write_them(condition):
+    m = toy()
+    m.del_component(m.c)
+    m.c = Complementarity(expr=condition(m))
+    pyo.SolverFactory('mpec_hybrid').solve(m)
+    assert sorted((round(m.x.value, 6), round(m.y.value, 6))) == [0, 1]
