@@ -10,6 +10,7 @@ CONTINUOUS         Var                       the Constraint by which it follows 
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
+ARTIFICIAL         Var                       ``True``: its bounds are the method's, not the plant's; a certificate looks beyond them
 PENALTY            Expression                its weight rho; guides the homotopy, never part of the reported objective
 =================  ========================  ===========================================================================
 """
@@ -20,6 +21,7 @@ CONTINUOUS = 'fesd_continuous'
 SELECTOR = 'fesd_selector'
 INDICATOR = 'fesd_indicator'
 DECIDED = 'fesd_decided'
+ARTIFICIAL = 'fesd_artificial'
 PENALTY = 'fesd_penalty'
 
 #: Blocks that the package generates are named with this prefix; the user's own components never are.

@@ -1,4 +1,7 @@
-"""Small models with known dynamics, shared by the tests, and a few ways to look at a model."""
+"""Small models with known dynamics, shared by the tests, and a few ways to look at a model.
+
+Rules ask their component for the model (``d.model()``), so that clones can be discretised too.
+"""
 
 import random
 
@@ -53,11 +56,13 @@ def signum(x0=-2.0, discretised=False):
 
     @m.Disjunct(m.t)
     def below(d, t):
+        m = d.model()
         d.region = pyo.Constraint(expr=m.x[t] <= 0)
         d.ode = pyo.Constraint(expr=m.dx[t] == 3)
 
     @m.Disjunct(m.t)
     def above(d, t):
+        m = d.model()
         d.region = pyo.Constraint(expr=m.x[t] >= 0)
         d.ode = pyo.Constraint(expr=m.dx[t] == 1)
 
@@ -79,6 +84,7 @@ def signum_of_scalars(x0=-2.0, discretised=False):
 
     @m.Block(m.t)
     def hyb(b, t):
+        m = b.model()
         b.below, b.above = Disjunct(), Disjunct()
         b.below.region = pyo.Constraint(expr=m.x[t] <= 0)
         b.below.ode = pyo.Constraint(expr=m.dx[t] == 3)
@@ -107,11 +113,13 @@ def units(discretised=False, where='block'):
 
         @m.Disjunct(m.t, m.i)
         def below(d, t, i):
+            m = d.model()
             d.region = pyo.Constraint(expr=m.x[i, t] <= level[i])
             d.ode = pyo.Constraint(expr=m.dx[i, t] == 3)
 
         @m.Disjunct(m.t, m.i)
         def above(d, t, i):
+            m = d.model()
             d.region = pyo.Constraint(expr=m.x[i, t] >= level[i])
             d.ode = pyo.Constraint(expr=m.dx[i, t] == 1)
 
@@ -125,6 +133,7 @@ def units(discretised=False, where='block'):
     def unit(b, i):
         @b.Block(m.t)
         def hyb(b, t):
+            m = b.model()
             b.dj = Disjunction(
                 expr=[
                     [m.x[i, t] <= level[i], m.dx[i, t] == 3],
@@ -160,12 +169,14 @@ def tank(discretised=False):
 
     @m.Disjunct(m.t)
     def full(d, t):
+        m = d.model()
         d.region = pyo.Constraint(expr=m.M[t] >= 5)
         d.first = pyo.Constraint(expr=m.L[t] == 0.1 * m.M[t])
         d.second = pyo.Constraint(expr=m.G[t] == 0)
 
     @m.Disjunct(m.t)
     def empty(d, t):
+        m = d.model()
         d.region = pyo.Constraint(expr=m.M[t] <= 5)
         d.first = pyo.Constraint(expr=m.G[t] == 0.2 * m.M[t])
         d.second = pyo.Constraint(expr=m.L[t] == 0)

@@ -8,18 +8,23 @@ discretisation equations stay, as other tools look them up.
 from pyomo.core import Constraint, RangeSet, Set, Var
 from pyomo.core.expr.visitor import replace_expressions
 
+from pyomo_fesd.marks import ARTIFICIAL, mark
 from pyomo_fesd.timeindex import TimeIndex, derivatives
 
 
-def add_lengths(block, grid, gamma):
+def add_lengths(block, grid, bounds):
     """Declare r_n and the length of every control stage.
 
-    Leaves ``block.element`` (1..N), ``block.stage``, ``block.r`` with (1 - gamma) <= r_n <= (1 + gamma), and
-    ``block.stage_length``: sum_n hbar_n r_n = nominal length of the stage (eq. 10).  A stage of one element has no freedom.
+    Leaves ``block.element`` (1..N), ``block.stage``, ``block.r`` within ``bounds``, and ``block.stage_length``: sum_n hbar_n r_n =
+    nominal length of the stage (eq. 10).  A stage of one element has no freedom.
+
+    An upper bound limits where a switch can be, once the number of elements before it is settled: problems with free switches
+    get false minima from it.  A lower bound keeps an element from collapsing into a point, where any multiplier would do.
     """
     block.element = RangeSet(len(grid.elements))
     block.stage = Set(initialize=list(grid.stages), ordered=True)
-    block.r = Var(block.element, bounds=(1 - gamma, 1 + gamma), initialize=1)
+    block.r = Var(block.element, bounds=bounds, initialize=1)
+    mark(block, ARTIFICIAL, block.r)
 
     @block.Constraint(block.stage)
     def stage_length(b, stage):

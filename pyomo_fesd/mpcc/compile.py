@@ -51,6 +51,7 @@ class Compiled:
     x : SX (n);  f, penalty : SX scalars;  g : SX (m);  G, H : SX (q);  eta, equal : SX (one each decision)
     lbx, ubx : arrays (n), the variables' bounds with the signs that plain-variable sides imply
     lbg, ubg : arrays (m)
+    artificial : bool array (n), variables whose bounds belong to the method
     x0 : array (n), the model's values projected to the bounds
     missing : int, number of variables without a value
     sign : +1.0, or -1.0 for a model that maximises (f is always minimised)
@@ -249,6 +250,7 @@ def _assemble(problem, conditions, rows, info, nl):
     for r in rows['G'] + rows['H']:
         if not _is_row(r) and r in column:
             c.lbx[column[r]] = max(c.lbx[column[r]], 0.0)
+    c.artificial = np.array([v.parent_component() in problem.artificial for v in info.variables], dtype=bool)
     c.has_objective = problem.objective is not None
     c.sign = -1.0 if c.has_objective and problem.objective.sense == maximize else 1.0
     start = np.array([np.nan if v.value is None else v.value for v in info.variables], dtype=float)

@@ -23,6 +23,8 @@ from pyomo_fesd.mpcc.stationarity import Stationarity, certify
 PROGRESS = 1e-8
 #: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
 BIACTIVE = 3.0
+#: With products below this and the same sides as before, a smaller eps shows nothing new.
+EXHAUSTED = 1e-8
 #: A feasible point with variables beyond this has run away along an unbounded objective.
 UNBOUNDED = 1e15
 #: After a failed relaxation: eps relative to its first value, and whether to start again from the model's values.
@@ -202,7 +204,7 @@ class HybridSolver:
                 self._explore(w, sets)
                 if self._settled(at.f):
                     return
-            if last:
+            if last or (sets.same_sides(previous) and np.max(at.G * at.H, initial=0.0) <= EXHAUSTED):
                 return
             previous, eps = sets, max(eps * options.eps_factor, options.eps_final)
 

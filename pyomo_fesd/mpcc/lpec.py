@@ -56,12 +56,17 @@ class Lpec:
         self._c = compiled
         self._options = options
 
-    def solve(self, w, sets, Delta, equal=None):
-        """Solve the LPEC at ``w`` with active sets ``sets``, trust region ``Delta`` and the decisions ``equal`` imposed."""
+    def solve(self, w, sets, Delta, equal=None, beyond=False):
+        """Solve the LPEC at ``w`` with active sets ``sets``, trust region ``Delta`` and the decisions ``equal`` imposed.
+
+        With ``beyond`` the artificial bounds do not count: is there descent that only they forbid?
+        """
         c = self._c
+        free = c.artificial & beyond
+        lbx, ubx = np.where(free, -np.inf, c.lbx), np.where(free, np.inf, c.ubx)
         at = c.evaluate(w)
         grad, J_g, J_G, J_H, J_equal = c.gradients(w)
-        d_low, d_high = _box(w, c.lbx, c.ubx, Delta)
+        d_low, d_high = _box(w, lbx, ubx, Delta)
         gamma = np.flatnonzero(sets.gamma)
         equal = np.zeros(J_equal.shape[0], dtype=bool) if equal is None else equal
         G, H = np.maximum(at.G, 0.0), np.maximum(at.H, 0.0)

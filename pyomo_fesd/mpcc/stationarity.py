@@ -18,6 +18,7 @@ class Stationarity(Enum):
     B = "B-stationary: certified by the LPEC, no branch descends"
     FEASIBLE = "feasible, and there is no objective: nothing to descend"
     DESCENT = "not certified: the LPEC found a direction of descent"
+    LIMITED = "not certified: descent is only stopped by a bound of the method (an element length); try another nfe or start"
     UNSOLVED = "not certified: HiGHS did not solve the LPEC"
     INFEASIBLE = "not certified: the point is not feasible"
 
@@ -95,12 +96,14 @@ def certify(c, lpec, w, tolerances, equal=None):
         return Certificate(Stationarity.B if c.has_objective else Stationarity.FEASIBLE, 0.0, None, *measures)
     if equal is None:
         equal = at.eta > tolerances.eta
-    result = lpec.solve(w, sets, tolerances.radius, equal)
+    small = tolerances.descent * max(1.0, abs(at.f))
+    result = lpec.solve(w, sets, tolerances.radius, equal, beyond=True)
+    grade = Stationarity.B
+    if result.solved and result.value < -small and c.artificial.any():
+        result, grade = lpec.solve(w, sets, tolerances.radius, equal), Stationarity.LIMITED
     if not result.solved:
         grade = Stationarity.UNSOLVED
-    elif result.value >= -tolerances.descent * max(1.0, abs(at.f)):
-        grade = Stationarity.B
-    else:
+    elif result.value < -small:
         grade = Stationarity.DESCENT
     return Certificate(grade, result.value, result, *measures)
 
