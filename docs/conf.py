@@ -20,7 +20,7 @@ extensions = [
     'sphinx.ext.napoleon',
     'if_exists',
     'options_table',
-    'run',
+    'run_python',
     'theory_links',
 ]
 autodoc_member_order = 'bysource'

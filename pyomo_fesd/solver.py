@@ -68,7 +68,13 @@ class MpecHybridConfig(SolverConfig):
             ('eps_init', 1.0, PositiveFloat, "first relaxation parameter eps of Reg(eps) (eq. 15)"),
             ('eps_final', 1e-9, PositiveFloat, "smallest eps; the homotopy usually ends earlier, at a certified branch"),
             ('eps_factor', 0.1, PositiveFloat, "eps is multiplied by this after each relaxation (1/Q)"),
-            ('relaxation', 'elastic', In(list(RELAXATIONS)), "form of Reg(eps): 'elastic' (one slack, weight 1/eps) or 'scholtes'"),
+            (
+                'relaxation',
+                'auto',
+                In(['auto', *RELAXATIONS]),
+                "form of Reg(eps): 'elastic' (one slack, weight 1/eps), 'scholtes' (products <= eps), or 'auto': elastic without an "
+                "objective, scholtes with one, the other after a failure",
+            ),
             ('relaxation_tol', 1e-6, PositiveFloat, "Ipopt's tol for relaxations, which only lead to a branch"),
             ('relaxation_iterations', 500, PositiveInt, "Ipopt iterations allowed to one relaxation"),
             ('gap_tol', 1e-3, PositiveFloat, "gap test: relative distance of the incumbent to the relaxed objective that ends the run"),

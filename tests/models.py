@@ -240,7 +240,7 @@ def snapshot(m):
     """Everything that a user can see of a model: names, active flags, values, what is fixed, expressions."""
     seen = {'points': list(m.t) if m.component('t') is not None else None}
     for block in m.block_data_objects(descend_into=EVERYWHERE):
-        seen[block.name, 'components'] = [(c.name, c.ctype, c.active) for c in block.component_objects(descend_into=False)]
+        seen[block.name, 'components'] = {(c.name, c.ctype, c.active) for c in block.component_objects(descend_into=False)}
     for data in m.component_data_objects(descend_into=EVERYWHERE):
         seen[data.name] = getattr(data, 'active', None)
         if data.ctype in (pyo.Var, pyo.BooleanVar, dae.DerivativeVar):

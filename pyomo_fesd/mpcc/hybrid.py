@@ -27,6 +27,9 @@ BIACTIVE = 3.0
 EXHAUSTED = 1e-8
 #: A feasible point with variables beyond this has run away along an unbounded objective.
 UNBOUNDED = 1e15
+#: Without an objective any solution will do, and the elastic form is by far the quickest to one; with an objective it settles
+#: early in worse minima than Scholtes' (gas-liquid optimal control: 250.005 instead of 250).  A failure changes the form.
+AUTO = {False: ('elastic', 'scholtes'), True: ('scholtes', 'elastic')}
 #: After a failed relaxation: eps relative to its first value, and whether to start again from the model's values.
 RECOVERY = ((1e-2, True), (10.0, False), (1e-4, True), (100.0, True))
 
@@ -148,12 +151,12 @@ class HybridSolver:
         )
         ipopt = options.nlp_options.value()
         timer.start('build')
-        sides = sort_sides(compiled)
-        budget = {'max_iter': options.relaxation_iterations, 'tol': options.relaxation_tol}
-        self._relaxation = RELAXATIONS[options.relaxation](compiled, sides, budget | ipopt, deadline)
+        self._sides = sort_sides(compiled)
         budget = {'max_iter': options.branch_iterations, 'tol': options.branch_tol}
-        self._branch = Branch(compiled, sides, budget | ipopt, deadline)
+        self._branch = Branch(compiled, self._sides, budget | ipopt, deadline)
         timer.stop('build')
+        self._forms = [options.relaxation] if options.relaxation != 'auto' else AUTO[compiled.has_objective]
+        self._relaxations = {}
         self._lpec = Lpec(compiled, options.lpec_options.value())
         self._tried = {}
         self.run = Run()
@@ -184,10 +187,10 @@ class HybridSolver:
 
     def _homotopy(self):
         options = self._options
-        w, eps, previous, failures = self._c.x0, options.eps_init, None, 0
+        w, eps, form, previous, failures = self._c.x0, options.eps_init, self._forms[0], None, 0
         while True:
             self.run.eps = eps
-            relaxed = self._relax(w, eps)
+            relaxed = self._relax(form, w, eps)
             self._keep_least_infeasible(relaxed.w)
             if not self._usable(relaxed):
                 if failures == len(RECOVERY):
@@ -195,6 +198,7 @@ class HybridSolver:
                 factor, restart = RECOVERY[failures]
                 w = self._c.x0 if restart else relaxed.w
                 eps, failures, previous = options.eps_init * factor, failures + 1, None
+                form = self._forms[failures % len(self._forms)]
                 continue
             w = relaxed.w
             at = self._c.evaluate(w)
@@ -285,8 +289,15 @@ class HybridSolver:
 
     # single steps, timed, counted and shown
 
-    def _relax(self, w, eps):
-        return self._nlp('relaxation', eps, lambda: self._relaxation.solve(w, eps))
+    def _relax(self, form, w, eps):
+        if form not in self._relaxations:
+            options = self._options
+            budget = {'max_iter': options.relaxation_iterations, 'tol': options.relaxation_tol}
+            with self._timed('build'):
+                self._relaxations[form] = RELAXATIONS[form](
+                    self._c, self._sides, budget | options.nlp_options.value(), self._deadline
+                )
+        return self._nlp('relaxation', eps, lambda: self._relaxations[form].solve(w, eps))
 
     def _branch_nlp(self, w, zero, equal, weight):
         result = self._nlp('branch', 0.0, lambda: self._branch.solve(w, zero, equal, weight))

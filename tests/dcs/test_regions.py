@@ -294,7 +294,7 @@ def test_wrong_regions_are_refused_by_name_and_the_model_stays_as_it_was(fault):
     assert snapshot(m) == before
 
 
-@pytest.mark.parametrize('condition', [pyo.log, lambda x: pyo.sqrt(x) - 1], ids=['log', 'sqrt'])
+@pytest.mark.parametrize('condition', [pyo.log, lambda x: pyo.sqrt(x) - 1, lambda x: x**0.5 - 1], ids=['log', 'sqrt', 'root'])
 def test_a_region_that_cannot_be_evaluated_is_refused_by_name(condition):
     m = two_modes(lambda m, t: condition(m.x[t]) <= 0, lambda m, t: condition(m.x[t]) >= 0)
     before = snapshot(m)

@@ -642,17 +642,6 @@ def test_a_fault_is_refused_by_name_and_the_model_stays_as_it_was(fault):
     assert error.component in str(error) and error.fix in str(error)
 
 
-def test_logic_over_time_is_refused_for_a_target_too():
-    m = with_component('logic', lambda m: pyo.LogicalConstraint(m.t, rule=lambda m, t: m.below[t].indicator_var))()
-    assert refusal_of(m, 'LogicalConstraint', targets=m.sgn).component == 'logic[0]'
-
-
-def test_logic_between_the_modes_is_refused_even_if_it_is_not_over_time():
-    m = signum()
-    m.logic = pyo.LogicalConstraint(expr=m.below[0].indicator_var.implies(m.above[2].indicator_var))
-    assert refusal_of(m, 'LogicalConstraint').component == 'logic'
-
-
 def test_logic_that_has_nothing_to_do_with_time_is_left_alone():
     m = signum()
     m.buy = pyo.BooleanVar([1, 2])

@@ -20,7 +20,7 @@ def solve(model, **options):
     return pyo.SolverFactory(SOLVER).solve(model, **options)
 
 
-@pytest.mark.parametrize('relaxation', ['elastic', 'scholtes'])
+@pytest.mark.parametrize('relaxation', ['auto', 'elastic', 'scholtes'])
 @pytest.mark.parametrize('problem', small_mpccs.ALL, ids=lambda f: f.__name__)
 def test_published_problems_are_solved_and_certified(problem, relaxation):
     model, best = problem()
