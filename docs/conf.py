@@ -18,10 +18,10 @@ extensions = [
     'sphinx.ext.autodoc',
     'sphinx.ext.mathjax',
     'sphinx.ext.napoleon',
+    'docstrings',
     'if_exists',
     'options_table',
     'run_python',
-    'theory_links',
 ]
 autodoc_member_order = 'bysource'
 autodoc_default_options = {'show-inheritance': False}

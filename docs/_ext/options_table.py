@@ -6,10 +6,10 @@ The table is made when the page is built, so it cannot differ from the code.  Op
 from importlib import import_module
 from inspect import getfile
 
+from docstrings import CITATION, target
 from docutils import nodes
 from sphinx.addnodes import pending_xref
 from sphinx.util.docutils import SphinxDirective
-from theory_links import CITATION, target
 
 WIDTHS = {'option': 22, 'default': 18, 'meaning': 60}
 

@@ -1,5 +1,6 @@
 """Mode equations in any writing become v = sum nu_i f_i (theory, eq. 7)."""
 
+import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 from pyomo.core.expr.visitor import identify_variables
@@ -79,6 +80,28 @@ def test_a_right_hand_side_may_depend_on_the_states():
     m = dcs(with_first_mode(lambda m, t: m.dx[t] == m.y[t] * pyo.exp(m.x[t])))
     m.x[0].value, m.y[0].value = 0.5, 2.0
     assert sliding_rate(m, m.dx[0]) == pytest.approx(0.25 * 2 * pyo.exp(0.5) + 0.75)
+
+
+def test_named_expressions_stand_for_their_contents():
+    m = scalar_ode()
+    m.gap = pyo.Expression(m.t, rule=lambda m, t: m.x[t] - 1)
+    m.speed = pyo.Expression(m.t, rule=lambda m, t: 3 - m.dx[t])
+    add_modes(m, lambda m, t: [m.gap[t] <= 0, m.speed[t] == 0], lambda m, t: [m.x[t] >= 1, m.dx[t] == 1])
+    dcs(m)
+    assert list(m._pyomo_fesd_dcs.component_map()) == ['sgn']
+    assert sliding_rate(m, m.dx[0]) == pytest.approx(MIXED)
+
+
+def test_the_modes_may_define_a_second_derivative():
+    m = scalar_ode()
+    m.ddx = dae.DerivativeVar(m.x, wrt=(m.t, m.t))
+    add_modes(
+        m, lambda m, t: [m.x[t] <= 0, 2 * m.ddx[t] == 6 + m.dx[t]], lambda m, t: [m.x[t] >= 0, m.ddx[t] == 1 + 0 * m.dx[t]]
+    )
+    m.sgn.deactivate()
+    add_modes(m, lambda m, t: [m.x[t] <= 0, 2 * m.ddx[t] == 6], lambda m, t: [m.x[t] >= 0, m.ddx[t] == 1], name='force')
+    dcs(m)
+    assert sliding_rate(m, m.ddx[0], disjunction=m.force[0]) == pytest.approx(MIXED)
 
 
 def test_coupled_equations_are_solved_before_they_are_blended():
@@ -255,6 +278,22 @@ def test_units_with_different_numbers_of_equations_share_a_disjunction():
     dcs(m)
     assert sliding_rate(m, m.dx[0], disjunction=m.unit['plain', 0]) == pytest.approx(MIXED)
     assert sliding_rate(m, m.F[0], disjunction=m.unit['with flow', 0]) == pytest.approx(MIXED)
+
+
+def test_each_unit_defines_the_variable_that_stands_alone_in_its_own_equations():
+    m = scalar_ode()
+    m.i = pyo.Set(initialize=['pump', 'valve'])
+    m.flow = pyo.Var(m.i, ['in', 'out'], m.t, initialize=1.0)
+
+    @m.Disjunction(m.i, m.t)
+    def unit(m, i, t):
+        a, b = m.flow[i, 'in', t], m.flow[i, 'out', t]
+        low, high = {'pump': (a == 3 * b, a == b), 'valve': (3 * a == b, a == b)}[i]
+        return [[m.x[t] <= 0, low], [m.x[t] >= 0, high]]
+
+    dcs(m)
+    assert sliding_rate(m, m.flow['pump', 'in', 0], disjunction=m.unit['pump', 0]) == pytest.approx(MIXED)
+    assert sliding_rate(m, m.flow['valve', 'out', 0], disjunction=m.unit['valve', 0]) == pytest.approx(MIXED)
 
 
 def test_a_mode_may_state_less_at_the_initial_time():

@@ -1,0 +1,37 @@
+"""Docstrings on their way into the reference page.
+
+* "(theory, eq. 11)" becomes a link to that equation; "paper, eq. (8)" means the paper's own numbers and stays as it is.
+* ``|d|`` stays an absolute value, which reStructuredText would take for a substitution.
+* The options that Pyomo writes into docstrings are cut off: they have a page of their own.
+"""
+
+import re
+
+CITATION = re.compile(r"(?<!paper, )eq\. \(?(\d+[abc]?'?)\)?")
+OPTIONS = ('**Class configuration**', 'Keyword Arguments')
+
+
+def target(number):
+    """Label of an equation on the theory page."""
+    return 'eq-' + number.replace("'", '-prime')
+
+
+def process(app, what, name, obj, options, lines):
+    """Handler of ``autodoc-process-docstring``; runs before napoleon."""
+    end = next((i for i, line in enumerate(lines) if line in OPTIONS), len(lines))
+    lines[:] = [_escaped(_linked(line)) for line in lines[:end]] + ['']
+
+
+def _linked(line):
+    return CITATION.sub(lambda found: f':ref:`{found[0]} <{target(found[1])}>`', line)
+
+
+def _escaped(line):
+    """Bars escaped, but not inside a literal."""
+    return '``'.join(part if i % 2 else part.replace('|', r'\|') for i, part in enumerate(line.split('``')))
+
+
+def setup(app):
+    """Register with Sphinx."""
+    app.connect('autodoc-process-docstring', process, priority=400)
+    return {'parallel_read_safe': True}
