@@ -10,7 +10,8 @@ CONTINUOUS         Var                       the Constraint by which it follows 
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
-ARTIFICIAL         Var                       ``True``: its bounds are the method's, not the plant's; a certificate looks beyond them
+ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
+                                             certificate looks beyond them
 PENALTY            Expression                its weight rho; guides the homotopy, never part of the reported objective
 =================  ========================  ===========================================================================
 """

@@ -12,19 +12,21 @@ from pyomo_fesd.marks import ARTIFICIAL, mark
 from pyomo_fesd.timeindex import TimeIndex, derivatives
 
 
-def add_lengths(block, grid, bounds):
+def add_lengths(block, grid, gamma):
     """Declare r_n and the length of every control stage.
 
-    Leaves ``block.element`` (1..N), ``block.stage``, ``block.r`` within ``bounds``, and ``block.stage_length``: sum_n hbar_n r_n =
-    nominal length of the stage (eq. 10).  A stage of one element has no freedom.
+    Leaves ``block.element`` (1..N), ``block.stage``, ``block.r`` and ``block.stage_length``: sum_n hbar_n r_n = nominal length of the
+    stage (eq. 10).  A stage of one element has no freedom.
 
-    An upper bound limits where a switch can be, once the number of elements before it is settled: problems with free switches
-    get false minima from it.  A lower bound keeps an element from collapsing into a point, where any multiplier would do.
+    The lower bound r_n >= 1 - gamma keeps an element from collapsing into a point, where any multiplier would do.  The upper
+    bound r_n <= 1 + gamma shares the elements out evenly between the switches while the homotopy decides; it is marked for that
+    only, because once the number of elements before a switch is settled it limits where the switch can be, and problems with
+    free switches get false minima from it.
     """
     block.element = RangeSet(len(grid.elements))
     block.stage = Set(initialize=list(grid.stages), ordered=True)
-    block.r = Var(block.element, bounds=bounds, initialize=1)
-    mark(block, ARTIFICIAL, block.r)
+    block.r = Var(block.element, bounds=(1 - gamma, None), initialize=1)
+    mark(block, ARTIFICIAL, block.r, 1 + gamma)
 
     @block.Constraint(block.stage)
     def stage_length(b, stage):

@@ -23,12 +23,12 @@ from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import discretised, find_continuous_set
 
 
-def _length_bounds(arg):
-    """gamma as (1 - gamma, 1 + gamma); a pair as it is."""
-    low, high = arg if isinstance(arg, (list, tuple)) else (1 - float(arg), 1 + float(arg))
-    if not 0 < low <= 1 or (high is not None and high < 1):
-        raise ValueError(f"length_bounds: gamma in [0, 1), or multiples (low, high) with 0 < low <= 1 <= high, not {arg}")
-    return low, high
+def _gamma(arg):
+    """gamma, with 0 <= gamma < 1."""
+    gamma = float(arg)
+    if not 0 <= gamma < 1:
+        raise ValueError(f"length_bounds (gamma) must lie in [0, 1), not {arg}")
+    return gamma
 
 
 def _components(arg):
@@ -93,9 +93,9 @@ class FiniteElements(Transformation):
     CONFIG.declare(
         'length_bounds',
         ConfigValue(
-            default=(0.1, None),
-            domain=_length_bounds,
-            description="bounds of h_n/hbar_n as a pair (None: no upper bound), or gamma of eq. (10): |h_n - hbar_n| <= gamma hbar_n",
+            default=0.9,
+            domain=_gamma,
+            description="gamma of eq. (10): |h_n - hbar_n| <= gamma hbar_n in the homotopy; the branch keeps the lower bound only",
         ),
     )
     CONFIG.declare(

@@ -52,6 +52,7 @@ class Compiled:
     lbx, ubx : arrays (n), the variables' bounds with the signs that plain-variable sides imply
     lbg, ubg : arrays (m)
     artificial : bool array (n), variables whose bounds belong to the method
+    guide_ubx : array (n), upper bounds in the homotopy: those of such variables are tighter there
     x0 : array (n), the model's values projected to the bounds
     missing : int, number of variables without a value
     sign : +1.0, or -1.0 for a model that maximises (f is always minimised)
@@ -250,7 +251,8 @@ def _assemble(problem, conditions, rows, info, nl):
     for r in rows['G'] + rows['H']:
         if not _is_row(r) and r in column:
             c.lbx[column[r]] = max(c.lbx[column[r]], 0.0)
-    c.artificial = np.array([v.parent_component() in problem.artificial for v in info.variables], dtype=bool)
+    guide = np.array([problem.artificial.get(v.parent_component(), np.inf) for v in info.variables], dtype=float)
+    c.artificial, c.guide_ubx = np.isfinite(guide), np.minimum(c.ubx, guide)
     c.has_objective = problem.objective is not None
     c.sign = -1.0 if c.has_objective and problem.objective.sense == maximize else 1.0
     start = np.array([np.nan if v.value is None else v.value for v in info.variables], dtype=float)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from pyomo.common.collections import ComponentSet
+from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, LogicalConstraint, Objective, SOSConstraint, Var
 from pyomo.dae import Integral
 from pyomo.gdp import Disjunct, Disjunction
@@ -65,8 +65,8 @@ class Mpcc:
         conditions l <= B <= u perp F, split into two pairs with two auxiliary variables when compiled
     decisions : list of Decision
     penalties : list of (Expression, float)
-    artificial : ComponentSet of Var
-        variables whose bounds belong to the method
+    artificial : ComponentMap Var -> float
+        variables whose bounds belong to the method, with their upper bound in the homotopy
     objective : ObjectiveData or None
     sources : list of ComplementarityData
         every active condition
@@ -77,7 +77,7 @@ class Mpcc:
     mixed: list = field(default_factory=list)
     decisions: list = field(default_factory=list)
     penalties: list = field(default_factory=list)
-    artificial: object = field(default_factory=ComponentSet)
+    artificial: object = field(default_factory=ComponentMap)
     objective: object = None
     sources: list = field(default_factory=list)
 
@@ -103,7 +103,7 @@ def read_problem(model):
         else:
             problem.conditions.append(Condition(source, *condition))
     problem.penalties = list(marks.marked(model, marks.PENALTY))
-    problem.artificial.update(component for component, _ in marks.marked(model, marks.ARTIFICIAL))
+    problem.artificial = ComponentMap(marks.marked(model, marks.ARTIFICIAL))
     return problem
 
 

@@ -31,7 +31,7 @@ class Scholtes(_Relaxation):
     def solve(self, w, eps):
         """Solve from ``w``; eps is the upper bound of the product rows."""
         self._ubg[len(self._ubg) - self._c.G.numel() :] = eps
-        return self._nlp.solve(w, [], self._c.lbx, self._c.ubx, self._lbg, self._ubg)
+        return self._nlp.solve(w, [], self._c.lbx, self._c.guide_ubx, self._lbg, self._ubg)
 
 
 class Elastic(_Relaxation):
@@ -57,7 +57,7 @@ class Elastic(_Relaxation):
         c = self._c
         at = c.evaluate(w)
         s = min(1.0, (at.G * at.H).max(initial=0.0) + self.ROOM)
-        lbx, ubx = np.append(c.lbx, 0.0), np.append(c.ubx, np.inf)
+        lbx, ubx = np.append(c.lbx, 0.0), np.append(c.guide_ubx, np.inf)
         result = self._nlp.solve(np.append(w, s), [1 / eps], lbx, ubx, self._lbg, self._ubg)
         return replace(result, w=result.w[:-1])
 

@@ -95,13 +95,9 @@ def test_named_expressions_stand_for_their_contents():
 def test_the_modes_may_define_a_second_derivative():
     m = scalar_ode()
     m.ddx = dae.DerivativeVar(m.x, wrt=(m.t, m.t))
-    add_modes(
-        m, lambda m, t: [m.x[t] <= 0, 2 * m.ddx[t] == 6 + m.dx[t]], lambda m, t: [m.x[t] >= 0, m.ddx[t] == 1 + 0 * m.dx[t]]
-    )
-    m.sgn.deactivate()
-    add_modes(m, lambda m, t: [m.x[t] <= 0, 2 * m.ddx[t] == 6], lambda m, t: [m.x[t] >= 0, m.ddx[t] == 1], name='force')
+    add_modes(m, lambda m, t: [m.x[t] <= 0, 2 * m.ddx[t] == 6], lambda m, t: [m.x[t] >= 0, m.ddx[t] == 1])
     dcs(m)
-    assert sliding_rate(m, m.ddx[0], disjunction=m.force[0]) == pytest.approx(MIXED)
+    assert sliding_rate(m, m.ddx[0]) == pytest.approx(MIXED)
 
 
 def test_coupled_equations_are_solved_before_they_are_blended():

@@ -204,9 +204,9 @@ def test_length_bounds_hold():
 
 
 def test_elements_that_may_not_change_their_length_stay_where_they_are():
-    m = run(signum.build(), nfe=3, length_bounds=0)  # the switch at 2/3 is a boundary of this grid
-    assert lengths(m) == pytest.approx([2 / 3] * 3)
-    assert m.x[2].value == pytest.approx(4 / 3, abs=1e-9)
+    m = run(crossing.build(), nfe=3, length_bounds=0)  # the switch at 0.5 is a boundary of this grid
+    assert lengths(m) == pytest.approx([0.5] * 3)
+    assert m.x[1.5].value == pytest.approx(crossing.FINAL, abs=1e-9)
 
 
 def test_a_model_without_switches_keeps_its_elements():

@@ -45,5 +45,12 @@ def multipliers(wrt):
 
 
 def seen(m):
-    """``snapshot`` of a model, the components of each block without their order of declaration."""
-    return {key: sorted(map(str, value)) if key[1:] == ('components',) else value for key, value in snapshot(m).items()}
+    """``snapshot`` without the order of declaration in each block and without stale flags, which Pyomo keeps for all models at once."""
+    found = {}
+    for key, value in snapshot(m).items():
+        if key[1:] == ('components',):
+            value = sorted(map(str, value))
+        elif isinstance(value, tuple) and len(value) == 3:
+            value = value[:2]
+        found[key] = value
+    return found
