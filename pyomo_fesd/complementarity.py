@@ -6,9 +6,9 @@ equation to every condition and refuses forms that people write.  Here the argum
 
 from typing import NamedTuple
 
-from pyomo.core import value
-from pyomo.core.expr import InequalityExpression, RangedExpression, EqualityExpression
 from pyomo.common.numeric_types import native_numeric_types
+from pyomo.core import value
+from pyomo.core.expr import EqualityExpression, InequalityExpression, RangedExpression
 
 from pyomo_fesd.errors import FesdError
 
@@ -92,7 +92,7 @@ def read(data):
     if args is None:
         raise FesdError(data, "this complementarity condition is empty", "give it a rule, or delete the index")
     sides = [side(a) for a in args]
-    for s, arg in zip(sides, args):
+    for arg in args:
         if isinstance(arg, EqualityExpression):
             raise FesdError(data, f"one side is an equality, '{arg}'", "write the equality as a Constraint of its own")
     # a side of two variables' making: prefer the bounds that the condition itself states over declared ones

@@ -1,7 +1,7 @@
 """The size of a model: what is in it, and what was left out."""
 
 import pandas as pd
-from pyomo.core import Block, Constraint, Var
+from pyomo.core import Block, Constraint
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity

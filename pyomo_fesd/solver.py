@@ -34,10 +34,11 @@ from pyomo.core.staleflag import StaleFlagManager
 from pyomo_fesd import marks
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.mpcc.compile import compile_problem
-from pyomo_fesd.mpcc.hybrid import HybridSolver, Outcome, Tolerances
+from pyomo_fesd.mpcc.hybrid import HybridSolver
 from pyomo_fesd.mpcc.lpec import Lpec
-from pyomo_fesd.mpcc.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.problem import read_problem
+from pyomo_fesd.mpcc.relaxation import RELAXATIONS
+from pyomo_fesd.mpcc.run import Outcome, Tolerances
 from pyomo_fesd.mpcc.stationarity import certify as certify_point
 from pyomo_fesd.mpcc.table import Table
 

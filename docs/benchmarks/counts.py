@@ -15,8 +15,9 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parents[1] / 'examples'))
 
 import gas_liquid_tank  # noqa: E402
-import pyomo_fesd  # noqa: E402
 import signum  # noqa: E402
+
+import pyomo_fesd  # noqa: E402
 
 CASES = (('signum', signum.build, 10, 2), ('tank', gas_liquid_tank.build, 100, 3))
 FORMS = {

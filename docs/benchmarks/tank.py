@@ -9,6 +9,7 @@ writes tank.csv beside this file.  Times are medians of several runs on the mach
 import statistics
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -20,8 +21,9 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1] / 'examples')]
 
 import gas_liquid_tank  # noqa: E402
-import pyomo_fesd  # noqa: E402
 from tank_nosnoc import solve_tank_with_nosnoc  # noqa: E402
+
+import pyomo_fesd  # noqa: E402
 
 REPEATS = 3
 #: (scheme, K) of the two tools
@@ -86,10 +88,10 @@ def measure():
     rows = []
     for scheme, K in SCHEMES:
         for N in NUMBERS:
-            tools = {'pyomo_fesd': lambda: ours(N, K, scheme)}
+            tools = {'pyomo_fesd': partial(ours, N, K, scheme)}
             for tolerance in NOSNOC_TOLERANCES:
                 name = 'nosnoc 0.2.0' + ('' if tolerance is None else f', comp_tol={tolerance:g}')
-                tools[name] = lambda tolerance=tolerance: theirs(N, K, scheme, tolerance)
+                tools[name] = partial(theirs, N, K, scheme, tolerance)
             for tool, run in tools.items():
                 rows.append({'tool': tool, 'scheme': scheme, 'K': K, 'N': N} | median([run() for _ in range(REPEATS)]))
                 print(rows[-1], flush=True)

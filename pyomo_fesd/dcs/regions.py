@@ -10,10 +10,10 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
-from scipy.optimize import linprog
 from pyomo.core import value
 from pyomo.core.expr.visitor import identify_variables
+from scipy.linalg import null_space
+from scipy.optimize import linprog
 
 from pyomo_fesd.errors import FesdError
 

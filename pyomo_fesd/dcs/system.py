@@ -89,7 +89,7 @@ class Reader:
         for disjunct, (equalities, inequalities) in zip(modes, split):
             mentioned = (v for c in (*equalities, *inequalities) for v in identify_variables(c.body))
             refuse_foreign(mentioned, disjunction.model(), disjunct)
-        self._refuse_derivatives_in_regions(modes, split)
+        self._refuse_derivatives_in_regions(split)
         source = disjunction.parent_component()
         choice, patterns = self._choices.setdefault(source, {}), self._patterns.setdefault(source, {})
         equalities, inequalities = ([part[k] for part in split] for k in (0, 1))
@@ -121,8 +121,8 @@ class Reader:
                 if isinstance(var, DerivativeVar):
                     raise FesdError(var, "a DerivativeVar inside a disjunct", "declare it on the block that holds its state")
 
-    def _refuse_derivatives_in_regions(self, modes, split):
-        for disjunct, (_, inequalities) in zip(modes, split):
+    def _refuse_derivatives_in_regions(self, split):
+        for _, inequalities in split:
             for con in inequalities:
                 for v in identify_variables(con.body, include_fixed=True):
                     if self.is_derivative(v):

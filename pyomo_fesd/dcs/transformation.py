@@ -1,14 +1,15 @@
 """``fesd.dcs``: time-indexed Disjunctions become a dynamic complementarity system."""
 
+from weakref import ref
+
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap
-from pyomo.common.config import ConfigDict, ConfigValue, In
-from pyomo.common.config import document_class_CONFIG
+from pyomo.common.config import ConfigDict, ConfigValue, In, document_class_CONFIG
 from pyomo.core import Block, Constraint, Transformation, TransformationFactory, Var
 from pyomo.core.base.block import BlockData
+from pyomo.core.expr.visitor import replace_expressions
 from pyomo.core.util import target_list
 from pyomo.gdp import Disjunct, Disjunction
-from weakref import ref
 
 from pyomo_fesd import marks, records
 from pyomo_fesd.dcs import stewart, two_mode
@@ -236,8 +237,6 @@ def _blend(block, index, system, weights):
 
 def _copies(block, index, system, i):
     """Mode i's own copies v_i of the defined variables, with mode i's equations imposed on them (below eq. 7)."""
-    from pyomo.core.expr.visitor import replace_expressions
-
     equations = system.equations
     if block.component('own') is None:
         sets = (system.disjunction.parent_component().index_set(),) if index else ()

@@ -9,8 +9,7 @@ Leaves: ``nu``, ``p``, ``n``, ``switching`` (c = p - n), ``complementarity`` (in
 Does not apply: more than two modes, or a region of more than one condition.
 """
 
-from pyomo.core import Constraint, Var
-from pyomo.core import value
+from pyomo.core import Constraint, Var, value
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks

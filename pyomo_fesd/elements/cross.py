@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
-from pyomo.core import Block, Constraint, ConstraintList, RangeSet, Set, quicksum
+from pyomo.core import Block, ConstraintList, RangeSet, Set, quicksum
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
@@ -199,7 +199,7 @@ def _add_signs(block, families):
     block.nonnegative = ConstraintList()
     lower = ExpressionBoundsVisitor()
     for family in families:
-        for t, pair in family.sides.items():
+        for pair in family.sides.values():
             for expr in pair:
                 low = expr.lb if expr.is_variable_type() else lower.walk_expression(expr)[0]
                 if low is None or low < 0:

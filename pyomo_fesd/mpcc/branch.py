@@ -10,6 +10,7 @@ Does not apply: where the bounds of an assignment contradict each other; ``solve
 
 import casadi as ca
 import numpy as np
+from scipy import sparse
 
 from pyomo_fesd.mpcc.nlp import Nlp
 
@@ -96,7 +97,5 @@ class Branch:
 
 
 def _csr_pattern(J):
-    from scipy import sparse
-
     colptr, row = np.array(J.sparsity().colind()), np.array(J.sparsity().row())
     return sparse.csc_matrix((np.ones(len(row)), row, colptr), shape=J.shape).tocsr()

@@ -15,7 +15,7 @@ import numpy as np
 from pyomo.common.collections import ComponentMap
 from pyomo.common.modeling import unique_component_name
 from pyomo.core import Block, ConstraintList, Objective, Suffix, VarList, maximize, value
-from pyomo.core.expr import ExternalFunctionExpression, Expr_ifExpression, UnaryFunctionExpression
+from pyomo.core.expr import Expr_ifExpression, ExternalFunctionExpression, UnaryFunctionExpression
 from pyomo.repn.plugins.nl_writer import NLWriter
 from scipy import sparse
 

@@ -119,7 +119,5 @@ class Nlp:
         if said.getvalue():
             logger.debug("casadi: %s", said.getvalue())
         stats = self._solver.stats()
-        vector = lambda key: np.asarray(result[key], dtype=float).ravel()
-        return NlpResult(
-            vector('x'), float(result['f']), stats['return_status'], int(stats['iter_count']), vector('lam_g'), vector('lam_x')
-        )
+        w, lam_g, lam_x = (np.asarray(result[key], dtype=float).ravel() for key in ('x', 'lam_g', 'lam_x'))
+        return NlpResult(w, float(result['f']), stats['return_status'], int(stats['iter_count']), lam_g, lam_x)

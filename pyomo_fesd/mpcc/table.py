@@ -1,6 +1,19 @@
 """The log that ``tee=True`` prints: one aligned line for each NLP and LPEC."""
 
-HEADER = f"{'step':>4}  {'what':<11} {'eps':>8} {'objective':>15} {'violation':>10} {'compl.':>9} {'bi-act.':>7} {'iter':>5} {'time':>7}  status"
+#: Columns and their widths, negative for left-aligned.
+COLUMNS = {
+    'step': 4,
+    ' what': -12,
+    'eps': 8,
+    'objective': 15,
+    'violation': 10,
+    'compl.': 9,
+    'bi-act.': 7,
+    'iter': 5,
+    'time': 7,
+    ' status': -7,
+}
+HEADER = ' '.join(f'{name:{"<" if width < 0 else ">"}{abs(width)}}' for name, width in COLUMNS.items())
 
 
 class Table:

@@ -190,8 +190,9 @@ def test_a_disjunction_that_is_switched_off_stays_off_at_new_times():
     m.second = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 0, m.dx[t] == 7], [m.x[t] >= 0, m.dx[t] == 8]])
     m.second.deactivate()
     move(dcs(m), 10)
-    assert not list(m.component_data_objects(Disjunction, active=True))
     assert not any(d.active for d in m.second.values())
+    assert not any(d.transformation_block for dj in m.second.values() for d in dj.disjuncts)
+    assert pyomo_fesd.report(m)['pairs'] == 22  # two a time at the beginning and in each element, of 'sgn' alone
 
 
 def test_a_mode_that_is_switched_off_stays_off_at_new_times():

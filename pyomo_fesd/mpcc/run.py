@@ -1,0 +1,94 @@
+"""What a run of the hybrid algorithm is made of: tolerances, steps, counts, points, and how it ended."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+
+class Outcome(Enum):
+    """How a run ended; the value is the sentence for the user."""
+
+    CERTIFIED = "B-stationary point found and certified"
+    SOLVED = "exactly complementary solution found; there is no objective to minimise"
+    FEASIBLE = "feasible, exactly complementary point found, not certified"
+    INFEASIBLE = "no feasible point found: the problem is locally infeasible"
+    UNBOUNDED = "the objective falls without bound along feasible points"
+    TIME_LIMIT = "time limit reached"
+    ITERATION_LIMIT = "iteration limit reached"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Tolerances of the algorithm; see the options of ``mpec_hybrid`` for their meaning."""
+
+    feasibility: float
+    biactive: float
+    descent: float
+    eta: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the log: an NLP or LPEC with what came out of it; ``w`` is the point (order of ``Compiled.variables``)."""
+
+    kind: str
+    eps: float
+    f: float
+    violation: float
+    complementarity: float
+    biactive: int
+    iterations: int
+    status: str
+    seconds: float
+    w: np.ndarray = field(repr=False)
+
+
+@dataclass
+class Counts:
+    """Work done so far."""
+
+    nlps: int = 0
+    iterations: int = 0
+    lpecs: int = 0
+    binaries: int = 0
+
+
+@dataclass
+class Point:
+    """An exactly complementary point: the solution of its branch NLP, with its certificate."""
+
+    nlp: object
+    f: float
+    certificate: object
+
+    @property
+    def w(self):
+        """Values of the variables."""
+        return self.nlp.w
+
+
+@dataclass
+class Run:
+    """Everything that a run leaves.
+
+    Attributes
+    ----------
+    outcome : Outcome
+    w : array or None
+        the point to load: the incumbent, or the least infeasible one
+    point : Point or None
+    counts : Counts
+    eps : float
+        the last relaxation parameter
+    steps : list of Step
+    """
+
+    outcome: Outcome = None
+    w: np.ndarray = None
+    point: Point = None
+    counts: Counts = field(default_factory=Counts)
+    eps: float = None
+    steps: list = field(default_factory=list)
