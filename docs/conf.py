@@ -24,4 +24,3 @@ extensions = [
     'run_python',
 ]
 autodoc_member_order = 'bysource'
-autodoc_default_options = {'show-inheritance': False}

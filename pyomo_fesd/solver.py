@@ -16,6 +16,7 @@ from pyomo.common.config import (
     document_class_CONFIG,
     document_configdict,
 )
+from pyomo.common.gc_manager import PauseGC
 from pyomo.common.timing import HierarchicalTimer
 from pyomo.contrib.solver.common.base import Availability, LegacySolverWrapper, SolverBase
 from pyomo.contrib.solver.common.config import SolverConfig
@@ -173,7 +174,7 @@ class MpecHybrid(SolverBase):
         Results
             Pyomo's, and in ``extra_info``: ``outcome`` (a sentence), ``stationarity`` ('B' or 'not certified'), ``reason``,
             ``violation``, ``complementarity`` (absolute and ``_scaled``), ``biactive_pairs``, ``nlps``, ``nlp_iterations``,
-            ``lpecs``, ``binaries``, ``eps_last``, ``pairs``, ``missing_values``, ``violated`` (by name, where infeasible), ``steps``
+            ``lpecs``, ``binaries``, ``eps_last``, ``pairs``, ``missing_values``, ``violated`` (by name), ``steps``
 
         Raises
         ------
@@ -191,7 +192,8 @@ class MpecHybrid(SolverBase):
         StaleFlagManager.mark_all_as_stale()
         problem = read_problem(model)
         timer.start('compile')
-        compiled = compile_problem(problem, timer)
+        with PauseGC():
+            compiled = compile_problem(problem, timer)
         timer.stop('compile')
         table = Table(config.tee, compiled)
         deadline = None if config.time_limit is None else started + config.time_limit

@@ -5,8 +5,8 @@ Rules ask their component for the model (``d.model()``), so that clones can be d
 
 import random
 
-import pyomo.dae as dae
 import pyomo.environ as pyo
+from pyomo import dae
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
@@ -389,15 +389,16 @@ def planar(functions, modes, x0=1.0, y0=1.0):
     def equations(rates, writing, t):
         r, s = rates
         dx, dy, f, g = m.dx[t], m.dy[t], r + s * m.y[t], s - r * m.x[t]
-        return ([dx == f, dy == g], [2 * g == 2 * dy, f - dx == 0], [dx + dy == f + g, dx - dy == f - g], [-3 * dy == -3 * g, dx == f])[
-            writing
-        ]
+        return (
+            [dx == f, dy == g],
+            [2 * g == 2 * dy, f - dx == 0],
+            [dx + dy == f + g, dx - dy == f - g],
+            [-3 * dy == -3 * g, dx == f],
+        )[writing]
 
     def mode(signs, rates, factors, writing):
         def write(m, t):
-            stated = [
-                inequality(c, sign, factor, writing, t) for c, sign, factor in zip(functions, signs, factors) if sign
-            ]
+            stated = [inequality(c, sign, factor, writing, t) for c, sign, factor in zip(functions, signs, factors) if sign]
             return stated + equations(rates, writing, t)
 
         return write

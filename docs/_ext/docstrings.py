@@ -2,6 +2,7 @@
 
 * "(theory, eq. 11)" becomes a link to that equation; "paper, eq. (8)" means the paper's own numbers and stays as it is.
 * ``|d|`` stays an absolute value, which reStructuredText would take for a substitution.
+* "Source: ..." at the end stands before the sections, of which napoleon would take it for a part.
 * The options that Pyomo writes into docstrings are cut off: they have a page of their own.
 """
 
@@ -19,7 +20,16 @@ def target(number):
 def process(app, what, name, obj, options, lines):
     """Handler of ``autodoc-process-docstring``; runs before napoleon."""
     end = next((i for i, line in enumerate(lines) if line in OPTIONS), len(lines))
-    lines[:] = [_escaped(_linked(line)) for line in lines[:end]] + ['']
+    lines[:] = [_escaped(_linked(line)) for line in _source_first(lines[:end])] + ['']
+
+
+def _source_first(lines):
+    """The paragraph "Source: ..." moved before the first underlined heading."""
+    heading = next((i for i, line in enumerate(lines[1:]) if line.startswith('---')), len(lines))
+    start = next((i for i, line in enumerate(lines) if line.startswith('Source:')), len(lines))
+    if start < heading:
+        return lines
+    return [*lines[:heading], *lines[start:], '', *lines[heading:start]]
 
 
 def _linked(line):

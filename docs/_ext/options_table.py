@@ -8,6 +8,7 @@ from inspect import getfile
 
 from docstrings import CITATION, target
 from docutils import nodes
+from pyomo.common.config import ConfigDict
 from sphinx.addnodes import pending_xref
 from sphinx.util.docutils import SphinxDirective
 
@@ -34,7 +35,7 @@ class OptionsTable(SphinxDirective):
         return [table]
 
     def _option(self, entry):
-        default = repr(getattr(entry, '_default', {}))
+        default = '{}' if isinstance(entry, ConfigDict) else repr(entry._default)
         meaning = nodes.paragraph('', '', *self._linked(entry._description or ''))
         return _row(_code(entry.name()), _code(default), meaning)
 

@@ -73,11 +73,13 @@ def _captured():
     handler, logger = logging.StreamHandler(stream), logging.getLogger('pyomo_fesd')
     handler.setFormatter(logging.Formatter('WARNING: %(message)s'))
     logger.addHandler(handler)
+    logger.propagate = False
     try:
         with redirect_stdout(stream):
             yield stream
     finally:
         logger.removeHandler(handler)
+        logger.propagate = True
 
 
 def _picture(figure):

@@ -235,6 +235,9 @@ def _solvable(equations, defined):
     if any(v in e.nonlinear for e in equations for v in defined):
         return False
     A = _matrix(equations, defined)
+    if np.count_nonzero(A) == len(defined):
+        # the usual case, one variable an equation, without a decomposition
+        return bool(A.any(axis=0).all() and A.any(axis=1).all())
     return np.linalg.matrix_rank(A) == len(defined)
 
 

@@ -80,7 +80,7 @@ class Reader:
         chosen = [d for d in modes if d.indicator_var.fixed and d.indicator_var.value]
         modes = chosen or modes
         if not modes:
-            raise FesdError(disjunction, "all its disjuncts are switched off", "activate at least one, or deactivate the Disjunction")
+            raise FesdError(disjunction, "all its disjuncts are switched off", "activate one, or deactivate the Disjunction")
         for disjunct in modes:
             self._refuse_contents(disjunct)
         if len(modes) == 1:

@@ -5,6 +5,7 @@ from weakref import ref
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap
 from pyomo.common.config import ConfigDict, ConfigValue, In, document_class_CONFIG
+from pyomo.common.gc_manager import PauseGC
 from pyomo.core import Block, Constraint, Transformation, TransformationFactory, Var
 from pyomo.core.base.block import BlockData
 from pyomo.core.expr.visitor import replace_expressions
@@ -68,11 +69,12 @@ class DynamicComplementaritySystem(Transformation):
         for block in _blocks(instance, config.targets):
             refuse_logic_over_time(block, times.time)
         reader = Reader(derivatives(instance.model(), wrt))
-        found = [d for d in _disjunctions(instance, config.targets) if times.time(d) is not None]
-        systems = [reader.read(d) for d in found]
-        forms = [self._form(config.form, system) for system in systems]
-        for system, form in zip(systems, forms):
-            _add(system, form)
+        with PauseGC():
+            found = [d for d in _disjunctions(instance, config.targets) if times.time(d) is not None]
+            systems = [reader.read(d) for d in found]
+            forms = [self._form(config.form, system) for system in systems]
+            for system, form in zip(systems, forms):
+                _add(system, form)
         records.repeat_after_expansion(instance, 'fesd.dcs', wrt, targets=config.targets, form=config.form)
 
     @staticmethod

@@ -9,6 +9,7 @@ import logging
 from contextlib import contextmanager
 
 from pyomo.common.collections import ComponentMap
+from pyomo.common.gc_manager import PauseGC
 from pyomo.common.log import LoggingIntercept
 from pyomo.core import (
     Block,
@@ -62,7 +63,7 @@ def discretise(block, wrt, nfe, ncp, scheme):
         for components over time that cannot be expanded; the model is then as it was.
     """
     _check(block, wrt)
-    with restored_on_error(block, wrt):
+    with restored_on_error(block, wrt), PauseGC():
         inputs = _fixed_everywhere(block, wrt)
         place_boundaries(wrt, nfe)
         try:

@@ -15,8 +15,8 @@ from pyomo_fesd.timeindex import TimeIndex, derivatives
 def add_lengths(block, grid, gamma):
     """Declare r_n and the length of every control stage.
 
-    Leaves ``block.element`` (1..N), ``block.stage``, ``block.r`` and ``block.stage_length``: sum_n hbar_n r_n = nominal length of the
-    stage (eq. 10).  A stage of one element has no freedom.
+    Leaves ``block.element`` (1..N), ``block.stage``, ``block.r`` and ``block.stage_length``: sum_n hbar_n r_n = nominal length of
+    the stage (eq. 10).  A stage of one element has no freedom.
 
     The lower bound r_n >= 1 - gamma keeps an element from collapsing into a point, where any multiplier would do.  The upper
     bound r_n <= 1 + gamma shares the elements out evenly between the switches while the homotopy decides; it is marked for that

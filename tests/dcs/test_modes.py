@@ -1,8 +1,8 @@
 """Mode equations in any writing become v = sum nu_i f_i (theory, eq. 7)."""
 
-import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
+from pyomo import dae
 from pyomo.core.expr.visitor import identify_variables
 
 from tests.models import above, add_modes, below, dcs, form_of, modes_on, rate, residual, scalar_ode, tank
@@ -77,9 +77,9 @@ def test_a_mutable_param_on_the_right_hand_side_stays_mutable():
 
 
 def test_a_right_hand_side_may_depend_on_the_states():
-    m = dcs(with_first_mode(lambda m, t: m.dx[t] == m.y[t] * pyo.exp(m.x[t])))
+    m = dcs(with_first_mode(lambda m, t: m.dx[t] == m.y[t] * pyo.exp(m.x[t]) + m.x[t]))
     m.x[0].value, m.y[0].value = 0.5, 2.0
-    assert sliding_rate(m, m.dx[0]) == pytest.approx(0.25 * 2 * pyo.exp(0.5) + 0.75)
+    assert sliding_rate(m, m.dx[0]) == pytest.approx(0.25 * (2 * pyo.exp(0.5) + 0.5) + 0.75)
 
 
 def test_named_expressions_stand_for_their_contents():

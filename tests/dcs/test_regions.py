@@ -1,5 +1,7 @@
 """Regions: inequalities in any writing become switching functions and sign patterns (theory, eq. 4)."""
 
+from itertools import pairwise
+
 import pyomo.environ as pyo
 import pytest
 
@@ -97,9 +99,7 @@ def test_regions_may_follow_algebraic_variables_and_fixed_ones():
     m = scalar_ode()
     m.P, m.limit = pyo.Var(m.t, initialize=3.0), pyo.Var(initialize=2.0)
     m.limit.fix()
-    add_modes(
-        m, lambda m, t: [m.P[t] * m.x[t] <= m.limit, m.dx[t] == 3], lambda m, t: [m.x[t] * m.P[t] >= m.limit, m.dx[t] == 1]
-    )
+    add_modes(m, lambda m, t: [m.P[t] * m.x[t] <= m.limit, m.dx[t] == 3], lambda m, t: [m.x[t] * m.P[t] >= m.limit, m.dx[t] == 1])
     dcs(m)
     assert modes_at(m, (0.5, 0), (0.8, 0)) == [[0], [1]]
     m.limit.value = 2.7
@@ -127,6 +127,7 @@ def test_a_region_needs_no_initial_values():
 def test_reading_regions_leaves_values_and_stale_flags_alone():
     m = two_modes(lambda m, t: m.x[t] <= m.y[t], lambda m, t: m.x[t] >= m.y[t])
     m.y[2].set_value(7.0)
+    m.y[0].stale = m.x[2].stale = True
     before = {v.name: (v.value, v.stale, v.fixed) for v in m.component_data_objects(pyo.Var)}
     dcs(m)
     after = {v.name: (v.value, v.stale, v.fixed) for v in m.component_data_objects(pyo.Var)}
@@ -185,7 +186,7 @@ def test_close_thresholds_far_from_zero_are_told_apart():
 def test_four_thresholds_leave_only_the_patterns_that_can_occur():
     m = scalar_ode()
     limits = [0, 1, 2, 3]
-    between = [lambda m, t, a=a, b=b: [pyo.inequality(a, m.x[t], b), m.dx[t] == a] for a, b in zip(limits, limits[1:])]
+    between = [lambda m, t, a=a, b=b: [pyo.inequality(a, m.x[t], b), m.dx[t] == a] for a, b in pairwise(limits)]
     add_modes(m, lambda m, t: [m.x[t] <= 0, m.dx[t] == -1], *between, lambda m, t: [m.x[t] >= 3, m.dx[t] == 3])
     dcs(m)
     assert list(m._pyomo_fesd_dcs.component_map()) == ['sgn_stewart_5']

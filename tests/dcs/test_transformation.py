@@ -2,9 +2,9 @@
 
 import logging
 
-import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
+from pyomo import dae
 from pyomo.common.log import LoggingIntercept
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunct, Disjunction
@@ -28,7 +28,6 @@ from tests.models import (
     scalar_ode,
     signum,
     signum_of_lists,
-    signum_of_scalars,
     snapshot,
     tank,
     thresholds,
@@ -98,6 +97,7 @@ def test_every_style_says_the_same_system(style):
 def test_every_unit_switches_at_its_own_level(style):
     m = dcs(style())
     at_start = [d for d in disjunctions(m) if '0' in d.name]
+    assert len(at_start) == 2
     for (i, level), disjunction in zip({'a': 0.0, 'b': 1.0}.items(), at_start):
         for x, dx in ((level - 0.1, 3), (level + 0.1, 1)):
             m.x[i, 0].value = x
@@ -262,9 +262,9 @@ def test_two_disjunctions_are_independent_systems():
 # Modes that are switched off
 
 
-def switched_off(how, m, t, mode):
-    """Leave ``mode`` of a Disjunction at ``t`` as the only one that is not off, or the only one that is on."""
-    disjuncts = m.component(mode)[t].disjuncts
+def leave_only_the_first(disjunction, how):
+    """Switch all modes but the first off, or the first on."""
+    disjuncts = disjunction.disjuncts
     if how == 'on':
         disjuncts[0].indicator_var.fix(True)
     for other in disjuncts[1:]:
@@ -279,7 +279,7 @@ def switched_off(how, m, t, mode):
 def test_one_mode_left_simply_holds_without_any_pair(build, name, how):
     m = build()
     for t in m.t:
-        switched_off(how, m, t, name)
+        leave_only_the_first(m.component(name)[t], how)
     dcs(m)
     assert generated(m, Complementarity) == {} and generated(m, pyo.Var) == {}
     found = {str(con.body): (pyo.value(con.lower), pyo.value(con.upper)) for con in generated(m, pyo.Constraint).values()}
@@ -290,20 +290,16 @@ def test_one_mode_left_simply_holds_without_any_pair(build, name, how):
 def test_no_disjunct_of_a_transformed_disjunction_stays_active(how):
     m = signum()
     for t in m.t:
-        switched_off(how, m, t, 'sgn')
+        leave_only_the_first(m.sgn[t], how)
     dcs(m)
     assert active(m, Disjunct) == []
 
 
 def test_switching_one_of_three_modes_off_leaves_the_small_form():
-    m = thresholds()
-    for t in m.t:
-        m.level[t].disjuncts[2].deactivate()
-        m.level[t].disjuncts[1].deactivate()
-    add_modes(m, below, above, lambda m, t: [m.x[t] >= 9, m.dx[t] == 9])
+    m = add_modes(scalar_ode(), below, above, lambda m, t: [m.x[t] >= 9, m.dx[t] == 9])
     for t in m.t:
         m.sgn[t].disjuncts[2].indicator_var.fix(False)
-    dcs(m, targets=m.sgn)
+    dcs(m)
     assert list(m._pyomo_fesd_dcs.component_map()) == ['sgn']
     assert len(active(m, Complementarity)) == 2 * len(m.t)
 
@@ -478,9 +474,7 @@ def lists(*modes):
 
 def with_flows(first, second):
     """Modes that define the algebraic variables F and P."""
-    return lambda: add_modes(
-        flow_model(), lambda m, t: [m.x[t] <= 0, *first(m, t)], lambda m, t: [m.x[t] >= 0, *second(m, t)]
-    )
+    return lambda: add_modes(flow_model(), lambda m, t: [m.x[t] <= 0, *first(m, t)], lambda m, t: [m.x[t] >= 0, *second(m, t)])
 
 
 def inclusive_or():

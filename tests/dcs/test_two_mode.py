@@ -10,8 +10,8 @@ from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
 from tests.models import (
-    add_modes,
     above,
+    add_modes,
     below,
     dcs,
     generated,
