@@ -12,12 +12,13 @@ import logging
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 
-import pyomo_fesd
 from docutils import nodes
 from docutils.parsers.rst import directives
 from matplotlib.figure import Figure
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
+
+import pyomo_fesd
 
 PACKAGE = Path(pyomo_fesd.__file__).parent
 

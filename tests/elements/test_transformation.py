@@ -196,10 +196,9 @@ def test_a_keyword_that_cannot_be_meant_is_refused(keywords):
     assert seen(m) == before
 
 
-def test_length_bounds_hold():
-    m = run(signum.build(), nfe=10, length_bounds=0.5)
-    r = multipliers(m.t)
-    assert {(v.lb, v.ub) for v in r.values()} == {(0.5, 1.5)}
+def test_no_element_becomes_shorter_than_length_bounds_say():
+    m = run(signum.build(), nfe=10, length_bounds=0.1)
+    assert min(lengths(m)) >= 0.9 * 0.2 - 1e-9
     assert switch_time(m) == pytest.approx(2 / 3, abs=1e-9)
 
 
