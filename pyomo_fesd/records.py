@@ -45,7 +45,7 @@ def repeat_after_expansion(block, name, wrt, **keywords):
 def repeat(block, wrt):
     """Apply again what was applied before ``wrt`` was discretised; each of them skips what it has already done."""
     repeats = records(block).repeats
-    records(block).repeats = [r for r in repeats if r[2] is not wrt]
     for name, where, over, keywords in repeats:
         if over is wrt:
             TransformationFactory(name).apply_to(where, wrt=wrt, **keywords)
+    records(block).repeats = [r for r in repeats if r[2] is not wrt]

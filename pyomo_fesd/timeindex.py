@@ -116,6 +116,10 @@ def find_continuous_set(block, wrt, caller):
                 f"{caller}: 'wrt' must be a pyomo.dae.ContinuousSet, not {type(wrt).__name__}",
                 "pass the time set, e.g. wrt=m.t; an IDAES flowsheet has one when built with dynamic=True",
             )
+        if wrt.model() is not block.model():
+            raise FesdError(
+                wrt, f"{caller}: this ContinuousSet belongs to another model than '{block.name}'", "pass the model's own"
+            )
         return wrt
     found = ComponentMap()
     for root in (block, block.model()):

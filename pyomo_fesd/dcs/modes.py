@@ -16,6 +16,8 @@ from pyomo.core import value
 from pyomo.core.expr.compare import compare_expressions
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.repn import generate_standard_repn
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from pyomo_fesd.errors import FesdError
 
@@ -35,11 +37,14 @@ class ModeEquations:
         ``rhs[i][j]`` is f_i of v_j as an expression; None where mode i has no explicit form
     equations : list of lists of ConstraintData
         the equations of each mode, as the user wrote them
+    used : list of lists of lists of ConstraintData
+        ``used[i][j]``: the equations of mode i that define v_j
     """
 
     defined: list
     rhs: list
     equations: list
+    used: list
 
     def shared(self, j):
         """Whether all modes give v_j the same right-hand side."""
@@ -87,8 +92,8 @@ def read_equations(disjunction, disjuncts, equalities, is_derivative, is_state, 
     _require_equal_counts(disjunction, disjuncts, modes, is_derivative)
     wanted = _derivatives(disjunction, disjuncts, modes, is_derivative)
     defined = wanted + _algebraic(disjunction, modes, wanted, is_state, cache)
-    rhs = [_solve(equations, defined) for equations in modes]
-    return ModeEquations(defined, rhs, equalities)
+    rhs, used = zip(*(_solve(equations, defined) for equations in modes))
+    return ModeEquations(defined, list(rhs), equalities, list(used))
 
 
 @contextmanager
@@ -186,13 +191,12 @@ def _algebraic(disjunction, modes, derivatives, is_state, cache):
     if comb(len(candidates), number) > MOST_CHOICES:
         considered = [v for v in candidates if any(v in e.alone for eqs in modes for e in eqs)]
     choices = list(itertools.combinations(considered, number))
-    explicit = [c for c in choices if all(_solvable(eqs, [*derivatives, *c]) for eqs in modes)]
-    implicit = [c for c in choices if all(_matching(eqs, [*derivatives, *c]) for eqs in modes)]
-    for group in (explicit, implicit):
+    for fits in (_solvable, _matching):
+        group = [c for c in choices if all(fits(eqs, [*derivatives, *c]) for eqs in modes)]
         if group:
             chosen = _preferred(disjunction, modes, group)
             order = ComponentMap((v, k) for k, v in enumerate(candidates))
-            cache['chosen'] = [(order[v], v.parent_component()) for v in chosen] if group is explicit else ()
+            cache['chosen'] = [(order[v], v.parent_component()) for v in chosen] if fits is _solvable else ()
             return list(chosen)
     raise FesdError(
         disjunction,
@@ -243,26 +247,29 @@ def _solvable(equations, defined):
 
 def _matching(equations, defined):
     """Whether every equation can be paired with one of the variables (structural nonsingularity)."""
-    return any(
-        all(e.mentions(v) for e, v in zip(equations, order)) for order in itertools.permutations(defined)
-    )
+    mentions = csr_array([[e.mentions(v) for v in defined] for e in equations])
+    return bool((maximum_bipartite_matching(mentions) >= 0).all())
 
 
 def _solve(equations, defined):
-    """f of every defined variable, or None for all of them where the mode has no explicit form."""
+    """f of every defined variable (None for all of them where the mode has no explicit form), and the equations behind each."""
+    everything = [[e.constraint for e in equations] for _ in defined]
     if not _solvable(equations, defined):
-        return [None] * len(defined)
+        return [None] * len(defined), everything
     A = _matrix(equations, defined)
     known = ComponentSet(defined)
     if np.count_nonzero(A) == len(defined):
         # one variable an equation: the factor may be a mutable Param, so it stays an expression
-        order = [int(np.flatnonzero(A[:, j])[0]) for j in range(len(defined))]
-        return [_scaled(equations[i], known, equations[i].linear[v]) for i, v in zip(order, defined)]
+        order = [equations[int(np.flatnonzero(A[:, j])[0])] for j in range(len(defined))]
+        return [_scaled(e, known, e.linear[v]) for e, v in zip(order, defined)], [[e.constraint] for e in order]
     if any(not isinstance(e.linear[v], (int, float)) for e in equations for v in defined if v in e.linear):
-        return [None] * len(defined)
+        return [None] * len(defined), everything
     inverse = np.linalg.inv(A)
     rests = [_scaled(e, known, 1) for e in equations]
-    return [sum(float(c) * r for c, r in zip(row, rests) if c) for row in inverse]
+    return (
+        [sum(float(c) * r for c, r in zip(row, rests) if c) for row in inverse],
+        [[e.constraint for c, e in zip(row, equations) if c] for row in inverse],
+    )
 
 
 def _scaled(equation, defined, factor):

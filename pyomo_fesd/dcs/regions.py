@@ -10,6 +10,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from pyomo.common.numeric_types import native_numeric_types
 from pyomo.core import value
 from pyomo.core.expr.visitor import identify_variables
 from scipy.linalg import null_space
@@ -18,7 +19,7 @@ from scipy.optimize import linprog
 from pyomo_fesd.errors import FesdError
 
 #: Relative agreement of two functions' values at random points to count as proportional.
-PROPORTIONAL = 1e-9
+PROPORTIONAL = 1e-11
 #: More switching functions than this in one Disjunction have too many sign patterns to enumerate.
 MOST_FUNCTIONS = 12
 
@@ -43,10 +44,15 @@ def conditions(inequality):
     """The expressions ``c`` with ``c >= 0`` that an inequality constraint states (two for a ranged one)."""
     body, found = inequality.body, []
     if inequality.lower is not None:
-        found.append(body if value(inequality.lower) == 0 else body - inequality.lower)
+        found.append(body if _is_zero(inequality.lower) else body - inequality.lower)
     if inequality.upper is not None:
-        found.append(-body if value(inequality.upper) == 0 else inequality.upper - body)
+        found.append(-body if _is_zero(inequality.upper) else inequality.upper - body)
     return found
+
+
+def _is_zero(bound):
+    """Whether a bound is the constant 0; a mutable Param that is 0 now may be moved."""
+    return bound.__class__ in native_numeric_types and bound == 0
 
 
 def read_regions(disjunction, disjuncts, inequalities, cache):
@@ -72,16 +78,17 @@ def read_regions(disjunction, disjuncts, inequalities, cache):
                 f"this mode of Disjunction '{disjunction.name}' has no region condition",
                 "add the inequality on the states that holds where the mode is active",
             )
-    functions, values, S = _sign_matrix(disjuncts, stated)
-    key = S.tobytes()
+    functions, values, S = _sign_matrix(disjunction, disjuncts, stated)
+    relations = _relations(values)
+    key = (S.shape, S.tobytes(), (relations.T @ relations).round(6).tobytes())
     if key not in cache:
-        cache[key] = _patterns(disjunction, disjuncts, functions, values, S)
+        cache[key] = _patterns(disjunction, disjuncts, functions, relations, S)
     return Regions(functions, cache[key])
 
 
-def _sign_matrix(disjuncts, stated):
+def _sign_matrix(disjunction, disjuncts, stated):
     """Collect the distinct switching functions; S[i, k] = +-1 where mode i needs that sign of c_k, 0 where it does not say."""
-    sampled = _sample([c for cs in stated for c in cs])
+    sampled = _sample(disjunction, [c for cs in stated for c in cs])
     functions, values, rows = [], [], []
     for disjunct, cs in zip(disjuncts, stated):
         row = {}
@@ -107,15 +114,17 @@ def _sign_matrix(disjuncts, stated):
 
 
 def _find(F, values):
-    """Index of the function that ``F`` is a multiple of, and the sign of the factor."""
+    """Index of the function that ``F`` is a multiple of, and the sign of the factor; judged by how the values vary."""
+    variation = F - F.mean()
     for k, known in enumerate(values):
-        factor = F @ known / (known @ known)
-        if factor and np.abs(F - factor * known).max() <= PROPORTIONAL * np.abs(F).max():
+        other = known - known.mean()
+        factor = (variation @ other) / (other @ other) if other.any() else 0
+        if factor and np.abs(F - factor * known).max() <= PROPORTIONAL * np.abs(variation).max() + 1e-14 * np.abs(F).max():
             return k, int(np.sign(factor))
     return None, None
 
 
-def _sample(expressions):
+def _sample(disjunction, expressions):
     """Yield the values of each expression at the same random points; the variables keep their values."""
     variables = {id(v): v for e in expressions for v in identify_variables(e, include_fixed=True)}.values()
     count = len(expressions) + 3
@@ -126,15 +135,15 @@ def _sample(expressions):
         while row < count:
             for v, old, _ in kept:
                 v.set_value((old or 1.0) * random.uniform(0.5, 1.5), skip_validation=True)
-            sample = [value(e, exception=False) for e in expressions]
+            sample = [value_now(e) for e in expressions]
             tries += 1
-            if all(s is not None and np.isreal(s) and np.isfinite(s) for s in sample):
+            if None not in sample:
                 table[row] = sample
                 row += 1
             elif tries > 20 * count:
                 raise FesdError(
-                    str(expressions[0]),
-                    "a region condition cannot be evaluated near the initial values of its variables",
+                    disjunction,
+                    f"the region condition '{expressions[0]} >= 0' cannot be evaluated near the initial values of its variables",
                     "initialise the variables inside the domain of the expression",
                 )
     finally:
@@ -144,7 +153,16 @@ def _sample(expressions):
     yield from table.T
 
 
-def _patterns(disjunction, disjuncts, functions, values, S):
+def value_now(expression):
+    """Value of an expression at the present values, None where it has none."""
+    try:
+        now = value(expression, exception=False)
+    except (ArithmeticError, ValueError):
+        return None
+    return now if now is not None and np.isreal(now) and np.isfinite(now) else None
+
+
+def _patterns(disjunction, disjuncts, functions, relations, S):
     """Full sign patterns of every mode; each pattern that some point can have must belong to exactly one mode."""
     if len(functions) > MOST_FUNCTIONS:
         raise FesdError(
@@ -153,12 +171,11 @@ def _patterns(disjunction, disjuncts, functions, values, S):
             "split the Disjunction into independent ones, one for each equipment item that switches",
         )
     owned = [[] for _ in disjuncts]
-    possible = _possibility(values)
+    possible = _possibility(relations, len(functions))
     for pattern in itertools.product((1, -1), repeat=len(functions)):
         owners = [i for i, row in enumerate(S) if all(s in (0, p) for s, p in zip(row, pattern))]
         if len(owners) == 1:
-            # a mode keeps a pattern that it names in full without asking; an open sign is filled in only if it can occur
-            if np.all(S[owners[0]] != 0) or possible(pattern):
+            if possible(pattern):
                 owned[owners[0]].append(pattern)
         elif possible(pattern):
             where = ' and '.join(f"{c} {'>=' if p > 0 else '<='} 0" for c, p in zip(functions, pattern))
@@ -169,19 +186,29 @@ def _patterns(disjunction, disjuncts, functions, values, S):
                 f"{'are active at once' if owners else 'is active'}",
                 "make the inequalities of the disjuncts a partition of the state space",
             )
+    for disjunct, patterns in zip(disjuncts, owned):
+        if not patterns:
+            raise FesdError(
+                disjunct, "the region is empty: no point satisfies its inequalities", "correct the inequalities of this disjunct"
+            )
     return owned
 
 
-def _possibility(values):
-    """A test whether any point can have given signs of the c_k, from their affine dependence.
-
-    With values F of the functions at more points than functions, every relation ``a'c = b`` that holds at all points shows in
-    the null space of ``[F, -1]``; a pattern is impossible if the linear program with these relations has no interior point.
-    """
+def _relations(values):
+    """Rows ``(a, b)`` with ``a'c = b`` at every point, for functions scaled by how much they vary."""
+    if len(values) == 1:
+        return np.zeros((0, 2))
     F = np.asarray(values).T
-    relations = null_space(np.hstack([F, -np.ones((len(F), 1))]), rcond=1e-10).T
+    scale = np.abs(F - F.mean(axis=0)).max(axis=0)
+    F = F / np.where(scale > 0, scale, 1)
+    mean = F.mean(axis=0)
+    A = null_space(F - mean, rcond=1e-10 + 1e-15 * np.abs(F).max()).T
+    return np.hstack([A, (A @ mean)[:, None]])
+
+
+def _possibility(relations, n):
+    """A test whether any point can have given signs of the c_k, from their affine dependence."""
     A, b = relations[:, :-1], relations[:, -1]
-    n = F.shape[1]
 
     def possible(pattern):
         if not len(relations):

@@ -7,10 +7,11 @@ Leaves: ``nu``, ``lam`` (by region), ``mu``, ``stationarity``, ``simplex``, ``co
 Does not apply: never; for two modes eq. (5) is smaller.
 """
 
-from pyomo.core import Constraint, RangeSet, Var, value
+from pyomo.core import Constraint, RangeSet, Var
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
+from pyomo_fesd.dcs.regions import value_now
 
 NAME = 'stewart'
 
@@ -48,7 +49,7 @@ def add(block, index, system):
     nu = [block.nu[(*index, i)] for i in block.regions]
     lam = [block.lam[(*index, i)] for i in block.regions]
     mu = block.mu[index or None]
-    now = [value(g_i, exception=False) or 0.0 for g_i in g]
+    now = [value_now(g_i) or 0.0 for g_i in g]
     mu.value = min(now)
     for i, g_i in enumerate(g):
         nu[i].value, lam[i].value = 1 / len(g), now[i] - mu.value
@@ -59,3 +60,8 @@ def add(block, index, system):
             marks.mark(block, marks.SELECTOR, nu[i])
     block.simplex.add(index or None, sum(nu) == 1)
     return [sum(n for n, o in zip(nu, owner) if o == mode) for mode in range(len(system.modes))]
+
+
+def equations(block, index):
+    """The equations of one time."""
+    return [block.simplex[index or None], *(block.stationarity[(*index, i)] for i in block.regions)]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, BooleanVar, Constraint, LogicalConstraint, Var
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import DerivativeVar
@@ -51,14 +51,16 @@ class Reader:
     ----------
     derivatives : iterable of DerivativeVar
         those with respect to the time that the Disjunctions are indexed by
+    times : TimeIndex
     """
 
-    def __init__(self, derivatives):
+    def __init__(self, derivatives, times):
         derivatives = list(derivatives)
         self._derivatives = ComponentSet(derivatives)
         self._states = ComponentSet(d.get_state_var() for d in derivatives)
-        self._patterns = ComponentMap()
-        self._choices = ComponentMap()
+        self._times = times
+        self._patterns = {}
+        self._choices = {}
 
     def is_derivative(self, v):
         """Whether ``v`` is data of a derivative with respect to time."""
@@ -78,6 +80,12 @@ class Reader:
             )
         modes = [d for d in disjunction.disjuncts if self._possible(disjunction, d)]
         chosen = [d for d in modes if d.indicator_var.fixed and d.indicator_var.value]
+        if len(chosen) > 1:
+            raise FesdError(
+                disjunction,
+                "two modes are fixed to True: " + ', '.join(f"'{d.name}'" for d in chosen),
+                "a switching system is in one mode at a time: fix one indicator only",
+            )
         modes = chosen or modes
         if not modes:
             raise FesdError(disjunction, "all its disjuncts are switched off", "activate one, or deactivate the Disjunction")
@@ -90,8 +98,8 @@ class Reader:
             mentioned = (v for c in (*equalities, *inequalities) for v in identify_variables(c.body))
             refuse_foreign(mentioned, disjunction.model(), disjunct)
         self._refuse_derivatives_in_regions(split)
-        source = disjunction.parent_component()
-        choice, patterns = self._choices.setdefault(source, {}), self._patterns.setdefault(source, {})
+        _, family = self._times.split(disjunction)
+        choice, patterns = self._choices.setdefault(family, {}), self._patterns.setdefault(family, {})
         equalities, inequalities = ([part[k] for part in split] for k in (0, 1))
         equations = read_equations(disjunction, modes, equalities, self.is_derivative, self.is_state, choice)
         regions = read_regions(disjunction, modes, inequalities, patterns)

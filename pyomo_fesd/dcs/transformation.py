@@ -3,10 +3,10 @@
 from weakref import ref
 
 from pyomo.common.autoslots import AutoSlots
-from pyomo.common.collections import ComponentMap
+from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.common.config import ConfigDict, ConfigValue, In, document_class_CONFIG
 from pyomo.common.gc_manager import PauseGC
-from pyomo.core import Block, Constraint, Transformation, TransformationFactory, Var
+from pyomo.core import Block, Constraint, Set, Transformation, TransformationFactory, Var
 from pyomo.core.base.block import BlockData
 from pyomo.core.expr.visitor import replace_expressions
 from pyomo.core.util import target_list
@@ -66,11 +66,11 @@ class DynamicComplementaritySystem(Transformation):
         config.set_value(kwds)
         wrt = find_continuous_set(instance, config.wrt, 'fesd.dcs')
         times = TimeIndex(wrt)
+        found = [d for d in _disjunctions(instance, config.targets) if times.time(d) is not None]
         for block in _blocks(instance, config.targets):
             refuse_logic_over_time(block, times.time)
-        reader = Reader(derivatives(instance.model(), wrt))
+        reader = Reader(derivatives(instance.model(), wrt), times)
         with PauseGC():
-            found = [d for d in _disjunctions(instance, config.targets) if times.time(d) is not None]
             systems = [reader.read(d) for d in found]
             forms = [self._form(config.form, system) for system in systems]
             for system, form in zip(systems, forms):
@@ -148,6 +148,8 @@ def _blocks(instance, targets):
 def _disjunctions(instance, targets):
     """Active DisjunctionData of the targets, in declaration order."""
     for target in targets or [instance]:
+        if target.model() is not instance.model():
+            raise FesdError(target, "fesd.dcs: this target belongs to another model", "give a component of the model itself")
         if target.ctype is Disjunction:
             yield from (d for d in (target.values() if hasattr(target, 'values') else [target]) if d.active)
         elif target.ctype is Block:
@@ -186,11 +188,14 @@ def _form_block(system, form):
             form.declare(block, index)
         elif form is not None:
             form.declare(block, index, form.size(system))
-        block.mode = Constraint(*index, range(1, 1 + _most_constraints(system)))
+        block.numbers = Set(dimen=1)
+        block.mode = Constraint(*index, block.numbers)
+    for j in range(1, 1 + _number_of_equations(system)):
+        block.numbers.add(j)
     return block
 
 
-def _most_constraints(system):
+def _number_of_equations(system):
     if system.equations is None:
         return sum(1 for _ in system.modes[0].component_data_objects(Constraint, active=True, descend_into=Block))
     return len(system.equations.defined)
@@ -212,7 +217,7 @@ def _add(system, form):
         _blend(block, index, system, weights)
         for disjunct, weight in zip(system.modes, weights):
             marks.mark(block, marks.INDICATOR, disjunct, weight)
-        _map_complementarity(block, index, system)
+        _map_form(block, index, system, form)
     _switch_off(block, system)
 
 
@@ -233,8 +238,7 @@ def _blend(block, index, system, weights):
             expr = copies[0][j]
         else:
             expr = sum(w * f[j] for w, f in zip(weights, copies) if not (isinstance(f[j], (int, float)) and f[j] == 0))
-        sources = [con for cons in equations.equations for con in cons]
-        _connect(block, block.mode.add((*index, j + 1), v == expr), system, sources)
+        _connect(block, block.mode.add((*index, j + 1), v == expr), system, [con for used in equations.used for con in used[j]])
 
 
 def _copies(block, index, system, i):
@@ -242,10 +246,10 @@ def _copies(block, index, system, i):
     equations = system.equations
     if block.component('own') is None:
         sets = (system.disjunction.parent_component().index_set(),) if index else ()
-        numbers = range(1, 1 + len(equations.defined))
-        modes = range(1, 1 + len(system.disjunction.disjuncts))
-        block.own = Var(*sets, modes, numbers, dense=False)
-        block.own_equation = Constraint(*sets, modes, numbers)
+        block.implicit_modes = Set(dimen=1)
+        block.own = Var(*sets, block.implicit_modes, block.numbers, dense=False)
+        block.own_equation = Constraint(*sets, block.implicit_modes, block.numbers)
+    block.implicit_modes.add(i + 1)
     own = [block.own[(*index, i + 1, j)] for j in range(1, 1 + len(equations.defined))]
     for copy, v in zip(own, equations.defined):
         copy.value = v.value
@@ -264,8 +268,10 @@ def _connect(block, image, system, sources):
         maps.images.setdefault(con, []).append(image)
 
 
-def _map_complementarity(block, index, system):
+def _map_form(block, index, system, form):
     maps = block.private_data('pyomo_fesd.dcs')
+    for con in form.equations(block, index):
+        maps.disjunction[con] = system.disjunction
     owners = [d for d, patterns in zip(system.modes, system.regions.patterns) for _ in patterns]
     for i, disjunct in enumerate(owners, start=1):
         condition = block.complementarity[(*index, i)]
@@ -276,6 +282,9 @@ def _map_complementarity(block, index, system):
 def _switch_off(block, system):
     """The sources keep their contents, inactive, as after Pyomo's own GDP transformations."""
     system.disjunction.deactivate()
+    for disjunct in system.disjunction.disjuncts:
+        if disjunct.active and disjunct not in ComponentSet(system.modes):
+            disjunct.deactivate()
     for disjunct in system.modes:
         disjunct._deactivate_without_fixing_indicator()
         disjunct._transformation_block = ref(block)

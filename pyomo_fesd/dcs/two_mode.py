@@ -9,10 +9,11 @@ Leaves: ``nu``, ``p``, ``n``, ``switching`` (c = p - n), ``complementarity`` (in
 Does not apply: more than two modes, or a region of more than one condition.
 """
 
-from pyomo.core import Constraint, Var, value
+from pyomo.core import Constraint, Var
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
+from pyomo_fesd.dcs.regions import value_now
 
 NAME = 'two_mode'
 
@@ -53,11 +54,15 @@ def add(block, index, system):
         the weight of each mode, nu and 1 - nu
     """
     nu, p, n = (getattr(block, name)[index or None] for name in ('nu', 'p', 'n'))
-    (c,), (pattern, *_), *_ = system.regions.functions, system.regions.patterns[0]
-    c = c if pattern[0] > 0 else -c
-    now = value(c, exception=False) or 0.0
+    (c,) = system.regions.functions  # the first mode's own condition: it holds where c >= 0
+    now = value_now(c) or 0.0
     nu.value, p.value, n.value = 0.5, max(now, 0.0), max(-now, 0.0)
     block.switching.add(index or None, c == p - n)
     block.complementarity.add((*index, 1), complements(nu >= 0, n >= 0))
     block.complementarity.add((*index, 2), complements(1 - nu >= 0, p >= 0))
     return [nu, 1 - nu]
+
+
+def equations(block, index):
+    """The equations of one time."""
+    return [block.switching[index or None]]

@@ -132,6 +132,7 @@ def _check(block, wrt):
 def hybrid_expansion(block, wrt):
     """While this lasts, pyomo.dae's discretisation of ``wrt`` expands Disjuncts, Disjunctions and Complementarities."""
     hybrid = [c for c in block.component_objects(HYBRID, descend_into=PLACES) if c.parent_component() is c]
+    off = [c for c in hybrid if is_indexed_by(c, wrt) and len(c) and not any(map(_in_use, c.values()))]
     aside = [c for c in hybrid if c.ctype is Disjunction or is_generated(c) or not c.index_set().isfinite()]
     blocks = [(c, c.ctype) for c in hybrid if c not in ComponentMap((a, 1) for a in aside)]
     homes = [(c, c.parent_block()) for c in aside]
@@ -150,6 +151,15 @@ def hybrid_expansion(block, wrt):
     for component, home in homes:
         if component.ctype is Disjunction and is_indexed_by(component, wrt):
             _expand_disjunction(component, home)
+    # what was switched off as a whole stays off at the new times
+    for component in off:
+        component.deactivate()
+
+
+def _in_use(data):
+    """Whether a hybrid component is active, or inactive only because a transformation has taken its place."""
+    disjuncts = {Disjunct: lambda: [data], Disjunction: lambda: data.disjuncts}.get(data.ctype, list)()
+    return data.active or any(d.transformation_block is not None for d in disjuncts)
 
 
 def _expand_disjunction(disjunction, home):
