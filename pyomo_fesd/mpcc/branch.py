@@ -14,6 +14,8 @@ from scipy import sparse
 
 from pyomo_fesd.mpcc.nlp import Nlp
 
+#: A branch starts next to its solution: Ipopt must not push the start away from the bounds, far from it on badly scaled models.
+WARM = {'bound_push': 1e-8, 'bound_frac': 1e-8, 'mu_init': 1e-6}
 #: A row without free variables may miss its bounds by this much.
 ROW_TOLERANCE = 1e-8
 
@@ -36,7 +38,7 @@ class Branch:
         g = ca.vertcat(c.g, sides.rows, c.equal)
         self._pattern = _csr_pattern(ca.jacobian(g, c.x))
         self._values = ca.Function('rows', [c.x], [g])
-        self._nlp = Nlp('branch', c.x, weight, c.f + weight * c.penalty, g, options, deadline)
+        self._nlp = Nlp('branch', c.x, weight, c.f + weight * c.penalty, g, WARM | options, deadline)
 
     def solve(self, w, zero, equal=None, weight=0.0):
         """Solve the branch ``zero`` from ``w``.

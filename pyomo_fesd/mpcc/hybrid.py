@@ -6,6 +6,7 @@ below the incumbent's (gap test), and eps may rise again when a relaxation fails
 """
 
 import time
+from collections import Counter
 from contextlib import contextmanager
 
 import numpy as np
@@ -22,6 +23,8 @@ from pyomo_fesd.mpcc.stationarity import Stationarity, certify
 PROGRESS = 1e-8
 #: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
 BIACTIVE = 3.0
+#: Starts from which a branch NLP is tried before it counts as infeasible.
+TRIES = 3
 #: With products below this and the same sides as before, a smaller eps shows nothing new.
 EXHAUSTED = 1e-8
 #: A feasible point with variables beyond this has run away along an unbounded objective.
@@ -69,7 +72,7 @@ class HybridSolver:
         self._forms = [options.relaxation] if options.relaxation != 'auto' else AUTO[compiled.has_objective]
         self._relaxations = {}
         self._lpec = Lpec(compiled, options.lpec_options.value())
-        self._tried = {}
+        self._tried = Counter()
         self.run = Run()
 
     def solve(self):
@@ -119,7 +122,8 @@ class HybridSolver:
                 self._explore(w, sets)
                 if self._settled(at.f):
                     return
-            if last or (sets.same_sides(previous) and np.max(at.G * at.H, initial=0.0) <= EXHAUSTED):
+            exhausted = self._tried[sets.zero.tobytes()] >= TRIES and np.max(at.G * at.H, initial=0.0) <= EXHAUSTED
+            if last or (exhausted and sets.same_sides(previous)):
                 return
             previous, eps = sets, max(eps * options.eps_factor, options.eps_final)
 
@@ -172,17 +176,21 @@ class HybridSolver:
             self.run.point = point
 
     def _point(self, w, zero):
-        """The solution of branch ``zero``, certified; None if it has none or was tried before."""
+        """The solution of branch ``zero``, certified; None if it has none.
+
+        A branch that was solved is not solved again; one that failed gets more tries, from better points.
+        """
         key = zero.tobytes()
-        if key in self._tried:
+        if self._tried[key] >= TRIES:
             return None
-        self._tried[key] = True
+        self._tried[key] += 1
         solved, equal = self._solve_branch(w, zero)
         if solved is None:
             return None
         certificate = self._certify(solved.w, equal)
         if not certificate.feasible:
             return None
+        self._tried[key] = TRIES
         if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
             raise _Stop(Outcome.UNBOUNDED)
         return Point(solved, self._c.evaluate(solved.w).f, certificate)
