@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from pyomo_fesd.elements.grid import read_grid
 from pyomo_fesd.errors import FesdError
-from pyomo_fesd.timeindex import find_continuous_set
+from pyomo_fesd.timeindex import derivatives, find_continuous_set
 from pyomo_fesd.trajectory import element_lengths, switches, trajectory
 
 
@@ -32,7 +32,7 @@ def plot(model, wrt=None, names=None, units=None):
     """
     wrt = find_continuous_set(model, wrt, 'plot')
     frame = trajectory(model, wrt)
-    names = names or [c for c in frame.columns if c not in ('label', 'element')]
+    names = names or _states_and_multipliers(model, wrt, frame)
     groups = [(name, _columns(frame, name)) for name in names]
     boundaries = element_lengths(model, wrt)['end']
     figure = Figure(figsize=(7, 1 + 1.9 * len(groups)), layout='constrained')
@@ -50,6 +50,13 @@ def plot(model, wrt=None, names=None, units=None):
         axis.margins(x=0.01)
     axes[-1].set_xlabel(wrt.local_name)
     return figure
+
+
+def _states_and_multipliers(model, wrt, frame):
+    """Names of the differential states, and of the Disjunctions that have multipliers."""
+    states = dict.fromkeys(d.get_state_var().name for d in derivatives(model, wrt))
+    disjunctions = dict.fromkeys(c.split(': ')[0] for c in frame.columns if ': ' in c)
+    return [*states, *disjunctions]
 
 
 def _columns(frame, name):

@@ -243,7 +243,7 @@ def _fill(results, model, c, run):
     info.outcome = run.outcome.value
     certificate = None if run.point is None else run.point.certificate
     info.stationarity = 'B' if certificate is not None and certificate.certified else 'not certified'
-    info.reason = run.outcome.value if certificate is None else certificate.grade.value
+    info.reason = '' if certificate is None else certificate.grade.value
     for name in ('violation', 'complementarity', 'violation_scaled', 'complementarity_scaled'):
         setattr(info, name, None if certificate is None else getattr(certificate, name))
     info.biactive_pairs = None if certificate is None else certificate.biactive
@@ -252,7 +252,7 @@ def _fill(results, model, c, run):
     info.lpecs, info.binaries = run.counts.lpecs, run.counts.binaries
     info.violated = _violated(c, run.w) if run.outcome is Outcome.INFEASIBLE and run.w is not None else []
     if info.violated:
-        info.reason += '; largest violations: ' + ', '.join(f'{name} ({amount:.1e})' for name, amount in info.violated)
+        info.reason = 'largest violations: ' + ', '.join(f'{name} ({amount:.1e})' for name, amount in info.violated)
     info.steps = run.steps
 
 

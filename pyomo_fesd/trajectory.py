@@ -12,6 +12,7 @@ from pyomo.mpec import Complementarity
 from pyomo_fesd import marks
 from pyomo_fesd.complementarity import read
 from pyomo_fesd.elements.grid import read_grid
+from pyomo_fesd.errors import FesdError
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set, strip_time
 
@@ -52,7 +53,7 @@ def physical_time(model, wrt=None):
     """
     wrt = find_continuous_set(model, wrt, 'physical_time')
     block = records(model).grids.get(wrt)
-    if block is None or not discretised(wrt):
+    if block is None:
         return {t: float(t) for t in wrt}
     grid = _grid(wrt)
     time = {wrt.first(): float(wrt.first())}
@@ -64,6 +65,8 @@ def physical_time(model, wrt=None):
 
 
 def _grid(wrt):
+    if not discretised(wrt):
+        raise FesdError(wrt, "it is not discretised yet, so there are no elements", "apply fesd.finite_elements first")
     return read_grid(wrt, [wrt.first(), wrt.last()])
 
 

@@ -57,9 +57,8 @@ def test_a_multiplier_is_drawn_element_by_element_and_jumps_at_the_switch(scheme
     m = run(signum.build(), nfe=5, ncp=2, scheme=scheme)
     pieces = curves(pyomo_fesd.plot(m, m.t, ['sgn: below']).axes[0])
     ends = pyomo_fesd.element_lengths(m)
-    assert [(p.get_xdata()[0], p.get_xdata()[-1]) for p in pieces] == pytest.approx(
-        list(ends[['start', 'end']].itertuples(index=False, name=None))
-    )
+    assert [p.get_xdata()[0] for p in pieces] == pytest.approx(ends['start'].tolist())
+    assert [p.get_xdata()[-1] for p in pieces] == pytest.approx(ends['end'].tolist())
     for piece, end in zip(pieces, ends['end']):
         assert piece.get_ydata() == pytest.approx(np.full(len(piece.get_ydata()), 1 if end < 2 / 3 + 1e-6 else 0), abs=1e-9)
     assert len({piece.get_color() for piece in pieces}) == 1
@@ -152,13 +151,7 @@ def difference(m, scheme='BACKWARD'):
     pyo.TransformationFactory('dae.finite_difference').apply_to(m, wrt=m.t, nfe=3, scheme=scheme)
 
 
-ORDINARY = {
-    'not discretised': lambda m: None,
-    'Radau': collocation,
-    'Legendre': lambda m: collocation(m, scheme=LEGENDRE),
-    'backward': difference,
-    'central': lambda m: difference(m, 'CENTRAL'),
-}
+ORDINARY = {'Radau': collocation, 'Legendre': lambda m: collocation(m, scheme=LEGENDRE), 'backward': difference}
 
 
 @pytest.mark.parametrize('kind', ORDINARY)
@@ -168,6 +161,15 @@ def test_an_ordinary_model_is_drawn(kind):
     (line,) = curves(axis)
     assert line.get_xdata().tolist() == list(m.t)
     assert verticals(axis, '--') == []
+
+
+@pytest.mark.parametrize(
+    'discretise, cause', [(lambda m: None, 'not discretised yet'), (lambda m: difference(m, 'CENTRAL'), 'CENTRAL Difference')]
+)
+def test_a_model_without_elements_is_not_drawn(discretise, cause):
+    m = states(discretise)
+    with pytest.raises(FesdError, match=f'^t: .*{cause}'):
+        pyomo_fesd.plot(m, m.t, ['x'])
 
 
 def test_multipliers_on_a_backward_difference_are_drawn():

@@ -283,9 +283,20 @@ def test_a_model_that_never_switches_says_so():
     assert found == [] and str(found) == repr(found) == 'no switch'
 
 
-@pytest.mark.parametrize('kind', GRIDS)
+@pytest.mark.parametrize('kind', ['Radau', 'Legendre', 'backward'])
 def test_an_ordinary_model_without_modes_has_no_switch(kind):
     assert str(pyomo_fesd.switches(GRIDS[kind](states()))) == 'no switch'
+
+
+@pytest.mark.parametrize(
+    'kind, cause',
+    [('not discretised', 'not discretised yet'), ('central', 'CENTRAL Difference'), ('forward', 'FORWARD Difference')],
+)
+def test_questions_about_elements_are_refused_where_there_are_none(kind, cause):
+    m = GRIDS[kind](states())
+    for ask in (pyomo_fesd.switches, pyomo_fesd.element_lengths):
+        with pytest.raises(FesdError, match=f'^t: .*{cause}'):
+            ask(m)
 
 
 def test_on_a_fixed_grid_the_element_with_the_switch_is_told_as_sliding():

@@ -123,7 +123,7 @@ def _check(block, wrt):
         elif component.ctype not in NATIVE and not isinstance(component, Var):
             raise FesdError(
                 component,
-                f"a {component.ctype.__name__} over time cannot be discretised",
+                f"components of type {component.ctype.__name__} over time cannot be discretised",
                 REFUSED.get(component.ctype, "put it in a Block over time, or declare it after the discretisation"),
             )
 

@@ -5,8 +5,7 @@ import logging
 from pyomo.core import Block, Constraint, value
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.marks import is_generated
-from pyomo_fesd.timeindex import is_indexed_by, time_position
+from pyomo_fesd.timeindex import TimeIndex, strip_time
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -15,40 +14,43 @@ DISCRETISATION = ('_disc_eq', '_cont_eq')
 
 
 def warn_explicit_time(block, wrt, grid):
-    """Warn once for each Constraint whose numbers change from one stage point to the next inside an element.
+    """Warn once for each family of constraints whose numbers change over time.
 
-    With all variables at one value, two points of a family that has no explicit time give the same number.
+    With all variables at one value, all points of a family that has no explicit time give the same number.  Control stages
+    may have data of their own, so points are compared within a stage.
     """
-    several = next((e for e in grid.elements if len(e.points) > 1), None)
-    points = several.points[:2] if several else [e.points[0] for e in grid.elements[:2]]
-    if len(points) < 2:
-        return
-    for component in block.component_objects(Constraint, active=True, descend_into=Block):
-        if not is_indexed_by(component, wrt) or is_generated(component) or component.local_name.endswith(DISCRETISATION):
-            continue
-        if _depends_on_time(component, time_position(component, wrt), points):
+    stage = {t: e.stage for e in grid.elements for t in _spread([*e.points])}
+    constraints = (
+        c
+        for component in block.component_objects(Constraint, active=True, descend_into=Block)
+        if not component.local_name.endswith(DISCRETISATION)
+        for c in component.values()
+        if c.active
+    )
+    for name, family in TimeIndex(wrt).families(constraints).items():
+        points = _spread([t for t in family if t in stage])
+        if any(_differ([family[t] for t in points if stage[t] == s]) for s in {stage[t] for t in points}):
             logger.warning(
-                "%s: its numbers depend on the time label (a Param over time, or t itself in the rule). Labels are not physical "
+                "%s: its numbers depend on the time label (a Param over time, or t itself in a rule). Labels are not physical "
                 "time once elements move. Use a clock state: a Var with derivative 1 that starts at the first time.",
-                component.name,
+                strip_time(name),
             )
 
 
-def _depends_on_time(component, position, points):
-    for index, data in component.items():
-        here = index if isinstance(index, tuple) else (index,)
-        if here[position] == points[0]:
-            there = (*here[:position], points[1], *here[position + 1 :])
-            there = there if isinstance(index, tuple) else there[0]
-            if there in component and data.active and component[there].active:
-                a, b = _at_one_value(data), _at_one_value(component[there])
-                if a is not None and b is not None and abs(a - b) > 1e-9 * max(1.0, abs(a)):
-                    return True
-    return False
+def _spread(points, most=12):
+    """At most about a dozen of many points, spread over all of them."""
+    return points[:: max(1, len(points) // most)]
+
+
+def _differ(constraints):
+    """Whether the constraints give different numbers where all variables have the same value."""
+    numbers = [n for n in map(_at_one_value, constraints) if n is not None]
+    return bool(numbers) and max(numbers) - min(numbers) > 1e-9 * max(1.0, *map(abs, numbers))
 
 
 def _at_one_value(constraint, number=0.7):
-    body = constraint.body - (constraint.upper if constraint.upper is not None else constraint.lower)
+    bounds = [b for b in (constraint.lower, constraint.upper) if b is not None]
+    body = constraint.body - (bounds[0] if bounds else 0)
     kept = [(v, v.value, v.stale) for v in identify_variables(body, include_fixed=True)]
     try:
         for v, _, _ in kept:

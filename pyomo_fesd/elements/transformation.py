@@ -3,6 +3,7 @@
 from pyomo.common.config import ConfigDict, ConfigValue, In, NonNegativeFloat, PositiveInt, document_class_CONFIG
 from pyomo.common.modeling import unique_component_name
 from pyomo.core import Block, Transformation, TransformationFactory
+from pyomo.gdp import Disjunction
 
 from pyomo_fesd import marks, records
 from pyomo_fesd.elements.controls import check_controls, hold_controls
@@ -20,7 +21,7 @@ from pyomo_fesd.elements.grid import check_resolution, read_grid
 from pyomo_fesd.elements.lengths import add_lengths, multiply_derivatives
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
 from pyomo_fesd.errors import FesdError
-from pyomo_fesd.timeindex import discretised, find_continuous_set
+from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set
 
 
 def _gamma(arg):
@@ -33,6 +34,12 @@ def _gamma(arg):
 
 def _components(arg):
     return list(arg) if isinstance(arg, (list, tuple)) else [arg]
+
+
+def _active_disjunctions(block, wrt):
+    times = TimeIndex(wrt)
+    found = block.component_data_objects(Disjunction, active=True, descend_into=Block)
+    return (d for d in found if times.time(d) is not None)
 
 
 @TransformationFactory.register('fesd.finite_elements', doc="Finite elements with switch detection, on top of pyomo.dae")
@@ -142,6 +149,9 @@ class FiniteElements(Transformation):
         if wrt in records.records(instance).grids:
             raise FesdError(wrt, "its elements are movable already", "apply fesd.finite_elements once for each ContinuousSet")
         check_controls(config.piecewise_constant, wrt)
+        waiting = next(_active_disjunctions(instance, wrt), None)
+        if waiting is not None:
+            raise FesdError(waiting, "an active Disjunction over time", "apply fesd.dcs first: its complementarity finds the switches")
         if discretised(wrt):
             return
         if config.stages is not None:

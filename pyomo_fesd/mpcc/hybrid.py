@@ -117,7 +117,7 @@ class HybridSolver:
             w = relaxed.w
             at = self._c.evaluate(w)
             sets = active_sets(at.G, at.H, self._biactive(at))
-            last = eps <= options.eps_final
+            last = eps <= 1.001 * options.eps_final  # products of eps_factor carry round-off
             if sets.same_sides(previous) or last or not sets.gamma.any():
                 self._explore(w, sets)
                 if self._settled(at.f):

@@ -19,7 +19,7 @@ IPOPT = {
     'mu_strategy': 'adaptive',
     'mu_oracle': 'quality-function',
     'least_square_init_duals': 'yes',
-    # 5 to 40 times faster factorisations on these systems (docs, benchmarks): MUMPS' own permutation costs most of the time
+    # MUMPS' own permutation for scaling takes most of the time on these systems and gains nothing
     'mumps_permuting_scaling': 0,
     'print_level': 0,
     'sb': 'yes',

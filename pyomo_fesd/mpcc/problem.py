@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, LogicalConstraint, Objective, SOSConstraint, Var
-from pyomo.dae import Integral
+from pyomo.dae import DerivativeVar, Integral
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
@@ -19,6 +19,7 @@ REFUSED = {
     LogicalConstraint: "apply core.logical_to_linear and a GDP transformation, or deactivate it",
     SOSConstraint: "write it as a Complementarity, or deactivate it",
     Integral: "discretise the model first, e.g. with fesd.finite_elements",
+    DerivativeVar: "discretise the model first, e.g. with fesd.finite_elements",
 }
 
 

@@ -37,7 +37,7 @@ class Scholtes(_Relaxation):
 class Elastic(_Relaxation):
     """min f + s/eps  s.t.  G, H >= 0,  G_i H_i <= s,  s >= 0: one slack for all pairs (l-infinity elastic mode).
 
-    On problems from finite elements it needs a third of the iterations of ``Scholtes`` (theory, section 5).
+    On simulations with finite elements it needs far fewer iterations than ``Scholtes``.
     """
 
     #: First value of s: 1, or just above what the start violates once that is less.

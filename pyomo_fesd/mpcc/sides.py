@@ -2,7 +2,7 @@
 
 A linear side whose least value over the variables' bounds is 0 needs no row: the bounds keep it non-negative, and it is zero
 exactly when each of its variables stands at the bound that gives the least value.  So a branch fixes variables instead of adding
-equations ("a sum of non-negative variables is 0": theory, section 5), and Ipopt never sees more equations than unknowns for
+equations ("a sum of non-negative variables is 0"), and Ipopt never sees more equations than unknowns for
 that reason.
 """
 

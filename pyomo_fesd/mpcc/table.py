@@ -47,7 +47,7 @@ class Table:
     def end(self, results):
         """Print the result."""
         info = results.extra_info
-        self._print(f"{info.outcome}" + (f" ({info.reason})" if info.reason != info.outcome else ""))
+        self._print(info.outcome + (f" ({info.reason})" if info.reason else ""))
         objective = results.incumbent_objective
         self._print(
             (f"objective {objective:.10g}, " if objective is not None else "")
