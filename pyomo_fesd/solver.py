@@ -193,7 +193,7 @@ class MpecHybrid(SolverBase):
         problem = read_problem(model)
         timer.start('compile')
         with PauseGC():
-            compiled = compile_problem(problem, timer)
+            compiled = compile_problem(problem, timer, config.working_dir)
         timer.stop('compile')
         table = Table(config.tee, compiled)
         deadline = None if config.time_limit is None else started + config.time_limit
@@ -217,6 +217,8 @@ class MpecHybrid(SolverBase):
                 "see the options page; Ipopt's own go in nlp_options={...}, HiGHS' in lpec_options={...}",
             )
         config.set_value(extra)
+        if config.threads is not None:
+            config.lpec_options.set_value({'threads': config.threads} | config.lpec_options.value())
         return config
 
     @staticmethod

@@ -83,13 +83,15 @@ def _csr(J):
     return sparse.csc_matrix((data, row, colptr), shape=J.shape).tocsr()
 
 
-def compile_problem(problem, timer):
+def compile_problem(problem, timer, folder=None):
     """Compile ``problem``.
 
     Parameters
     ----------
     problem : Mpcc
     timer : HierarchicalTimer
+    folder : path, optional
+        where the NL file is to be written and kept; default: a temporary one
 
     Raises
     ------
@@ -98,8 +100,8 @@ def compile_problem(problem, timer):
     """
     with _sides(problem) as (scratch, rows, conditions):
         timer.start('write')
-        with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, 'model.nl')
+        with tempfile.TemporaryDirectory() as temporary:
+            path = os.path.join(folder or temporary, 'model.nl')
             with open(path, 'w', newline='') as stream:
                 info = _write(problem.model, stream)
             timer.stop('write')

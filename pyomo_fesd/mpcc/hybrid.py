@@ -71,7 +71,7 @@ class HybridSolver:
         timer.stop('build')
         self._forms = [options.relaxation] if options.relaxation != 'auto' else AUTO[compiled.has_objective]
         self._relaxations = {}
-        self._lpec = Lpec(compiled, options.lpec_options.value())
+        self._lpec = Lpec(compiled, options.lpec_options.value(), deadline)
         self._tried = Counter()
         self.run = Run()
 

