@@ -80,7 +80,7 @@ class Branch:
     def _row_bounds(self, zero, equal):
         c, sides = self._c, self._sides
         own = sides.row_of >= 0
-        upper = np.full(np.count_nonzero(own), np.inf)
+        upper = np.full(sides.rows.numel(), np.inf)
         upper[sides.row_of[own & sides.zero_rows(zero)]] = 0.0
         equal = np.zeros(c.equal.numel(), dtype=bool) if equal is None else equal
         free = np.where(equal, 0.0, np.inf)

@@ -49,6 +49,7 @@ class Compiled:
     conditions : list of Condition, length q
     decisions : list of Decision
     x : SX (n);  f, penalty : SX scalars;  g : SX (m);  G, H : SX (q);  eta, equal : SX (one each decision)
+    side_of : int array (2q), equal numbers for equal sides among G (first q) and H
     lbx, ubx : arrays (n), the variables' bounds with the signs that plain-variable sides imply
     lbg, ubg : arrays (m)
     artificial : bool array (n), variables whose bounds belong to the method
@@ -128,9 +129,10 @@ def _sides(problem):
         if problem.objective is None:
             scratch.objective = Objective(expr=0)
         conditions = problem.conditions + [c for source, m in problem.mixed for c in _split(scratch, source, m)]
+        known = {}
         rows = {
-            'G': [_row(scratch, c.G) for c in conditions],
-            'H': [_row(scratch, c.H) for c in conditions],
+            'G': [_shared_row(scratch, c.G, known) for c in conditions],
+            'H': [_shared_row(scratch, c.H, known) for c in conditions],
             'eta': [_row(scratch, d.eta) for d in problem.decisions],
             'equal': [_row(scratch, d.constraint.body - d.constraint.upper) for d in problem.decisions],
             'penalty': [_row(scratch, weight * term.expr) for term, weight in problem.penalties],
@@ -170,6 +172,13 @@ def _split(scratch, source, m):
     return [Condition(source, m.body - m.lower, plus), Condition(source, m.upper - m.body, minus)]
 
 
+def _shared_row(scratch, expr, known):
+    """As ``_row``, one for a side that stands in several pairs: its branch equation must not appear twice."""
+    if id(expr) not in known:
+        known[id(expr)] = _row(scratch, expr)
+    return known[id(expr)]
+
+
 def _row(scratch, expr):
     """What stands for ``expr`` in the NL file: a number, a variable, or a row."""
     if not hasattr(expr, 'is_fixed') or expr.is_fixed():
@@ -177,6 +186,13 @@ def _row(scratch, expr):
     if expr.is_variable_type():
         return expr
     return scratch.row.add(expr >= 0)
+
+
+def _number(k, r, place, column):
+    """Equal for equal sides: the row, the variable counted behind all rows, or for the k-th side, a constant, -1 - k."""
+    if _is_row(r):
+        return place[r]
+    return len(place) + column[r] if r in column else -1 - k
 
 
 def _is_row(r):
@@ -248,6 +264,8 @@ def _assemble(problem, conditions, rows, info, nl):
     c.lbg, c.ubg = lower[own], upper[own]
     for name in ('G', 'H', 'eta', 'equal'):
         setattr(c, name, ca.vertcat(*map(sx, rows[name])) if rows[name] else ca.SX(0, 1))
+    sides = rows['G'] + rows['H']
+    c.side_of = np.array([_number(k, r, place, column) for k, r in enumerate(sides)], dtype=int)
     c.penalty = sum(map(sx, rows['penalty']), ca.SX(0))
     c.lbx, c.ubx = np.array(nl.x_lb, dtype=float), np.array(nl.x_ub, dtype=float)
     for r in rows['G'] + rows['H']:

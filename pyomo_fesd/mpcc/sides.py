@@ -54,8 +54,10 @@ def sort_sides(c):
     direction, least = _least(A, c.lbx, c.ubx)
     fixable = ~nonlinear & (np.abs(least + constant) <= EXACT)
     row_of = np.full(S.numel(), -1)
-    row_of[~fixable] = np.arange(np.count_nonzero(~fixable))
-    chosen = np.flatnonzero(~fixable)
+    needed = np.flatnonzero(~fixable)
+    _, first, row = np.unique(c.side_of[needed], return_index=True, return_inverse=True)
+    row_of[needed] = row
+    chosen = needed[first]
     return Sides(S[chosen.tolist()] if len(chosen) else ca.SX(0, 1), row_of, direction)
 
 

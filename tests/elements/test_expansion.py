@@ -10,7 +10,7 @@ from pyomo.mpec import Complementarity, complements
 import pyomo_fesd
 from pyomo_fesd import FesdError
 from pyomo_fesd.elements.expansion import discretise
-from tests.models import dcs, snapshot
+from tests.models import dcs
 from tests.problems import free_start
 from tests.problems.running import RADAU, SCHEMES, move, seen, solve
 
@@ -210,6 +210,41 @@ def test_a_mode_that_is_switched_off_stays_off_at_new_times():
     assert not any(d.active for d in m.above.values())
     assert pyomo_fesd.report(m)['pairs'] == 0
     assert solve(m).x[2].value == pytest.approx(-3, abs=1e-9)
+
+
+def test_a_mode_that_is_switched_off_in_one_unit_stays_off_there_only():
+    m = states()
+    m.i = pyo.Set(initialize=['a', 'b'])
+    rates = {'low': 3, 'high': 1}
+
+    @m.Disjunct(m.t, m.i, ['low', 'high'])
+    def mode(d, t, i, side):
+        d.region = pyo.Constraint(expr=m.x[t] <= 0 if side == 'low' else m.x[t] >= 0)
+        d.rate = pyo.Constraint(expr=m.dx[t] == rates[side])
+
+    m.dj = Disjunction(m.t, m.i, rule=lambda m, t, i: [m.mode[t, i, 'low'], m.mode[t, i, 'high']])
+    for t in m.t:
+        m.mode[t, 'a', 'high'].deactivate()
+    expand(m)
+    assert {index[1:] for index, d in m.mode.items() if not d.active} == {('a', 'high')}
+    assert sum(not d.active for d in m.mode.values()) == len(m.t)
+
+
+def test_a_mode_that_is_switched_off_in_every_block_stays_off_at_new_times():
+    m = states()
+
+    @m.Block(m.t)
+    def pipe(b, t):
+        b.low, b.high = Disjunct(), Disjunct()
+        b.low.region = pyo.Constraint(expr=m.x[t] <= 0)
+        b.high.region = pyo.Constraint(expr=m.x[t] >= 0)
+        b.dj = Disjunction(expr=[b.low, b.high])
+
+    for t in m.t:
+        m.pipe[t].high.deactivate()
+    expand(m)
+    assert not any(b.high.active for b in m.pipe.values())
+    assert all(b.low.active for b in m.pipe.values())
 
 
 def test_a_complementarity_that_is_switched_off_stays_off_at_new_times():
@@ -439,10 +474,10 @@ def test_an_error_in_a_rule_at_a_new_time_leaves_the_model_as_it_was(spoil, tran
 def test_an_error_leaves_the_order_of_declaration_as_it_was():
     m = signum.build()
     failing_constraint(m)
-    before = list(snapshot(m)[m.name, 'components'])
+    before = [c.local_name for c in m.component_objects(descend_into=False)]
     with pytest.raises(ArithmeticError):
         expand(m)
-    assert snapshot(m)[m.name, 'components'] == before
+    assert [c.local_name for c in m.component_objects(descend_into=False)] == before
 
 
 def test_an_error_after_the_expansion_leaves_the_model_as_it_was():

@@ -53,4 +53,6 @@ def seen(m):
         elif isinstance(value, tuple) and len(value) == 3:
             value = value[:2]
         found[key] = value
+    for suffix in m.component_data_objects(pyo.Suffix):
+        found[suffix.name, 'marked'] = sorted(component.name for component in suffix)
     return found
