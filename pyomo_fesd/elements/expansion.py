@@ -31,6 +31,7 @@ from pyomo.dae import ContinuousSet, DerivativeVar, Integral
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
+from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.marks import is_generated
 from pyomo_fesd.timeindex import TimeIndex, derivatives, is_indexed_by, strip_time
@@ -132,34 +133,53 @@ def _check(block, wrt):
 def hybrid_expansion(block, wrt):
     """While this lasts, pyomo.dae's discretisation of ``wrt`` expands Disjuncts, Disjunctions and Complementarities."""
     hybrid = [c for c in block.component_objects(HYBRID, descend_into=PLACES) if c.parent_component() is c]
-    off = [c for c in hybrid if is_indexed_by(c, wrt) and len(c) and not any(map(_in_use, c.values()))]
+    off = _switched_off(block, wrt)
     aside = [c for c in hybrid if c.ctype is Disjunction or is_generated(c) or not c.index_set().isfinite()]
-    blocks = [(c, c.ctype) for c in hybrid if c not in ComponentMap((a, 1) for a in aside)]
-    homes = [(c, c.parent_block()) for c in aside]
-    for component, home in homes:
-        home.del_component(component)
-    for component, _ in blocks:
-        component.parent_block().reclassify_component_type(component, Block)
+    waiting = ComponentMap((c, None) for c in aside)
+    # pyomo.dae passes over Suffixes, and so over whatever bears their type; nothing changes its place in the model
+    passing = [(c, c.ctype, Suffix if c in waiting else Block) for c in hybrid]
+    for component, _, disguise in passing:
+        component.parent_block().reclassify_component_type(component, disguise)
     try:
         with LoggingIntercept(None, 'pyomo.dae', logging.WARNING):
             yield
     finally:
-        for component, ctype in blocks:
+        for component, ctype, _ in passing:
             component.parent_block().reclassify_component_type(component, ctype)
-        for component, home in homes:
-            home.add_component(component.local_name, component)
-    for component, home in homes:
+    for component in aside:
         if component.ctype is Disjunction and is_indexed_by(component, wrt):
-            _expand_disjunction(component, home)
-    # what was switched off as a whole stays off at the new times
-    for component in off:
-        component.deactivate()
+            _expand_disjunction(component, component.parent_block())
+    _switch_off_again(block, wrt, off)
+
+
+def _switched_off(block, wrt):
+    """Families of hybrid components that are off at every present time, by the user's will and not by a transformation."""
+    times, off = TimeIndex(wrt), []
+    for ctype in HYBRID:
+        families = times.families(block.component_data_objects(ctype, descend_into=PLACES))
+        off += [(ctype, name) for name, family in families.items() if not any(map(_in_use, family.values()))]
+    return off
 
 
 def _in_use(data):
     """Whether a hybrid component is active, or inactive only because a transformation has taken its place."""
-    disjuncts = {Disjunct: lambda: [data], Disjunction: lambda: data.disjuncts}.get(data.ctype, list)()
-    return data.active or any(d.transformation_block is not None for d in disjuncts)
+    if data.active or is_generated(data):
+        return True
+    disjuncts = [data] if data.ctype is Disjunct else getattr(data, 'disjuncts', [])
+    return any(d.transformation_block is not None for d in disjuncts)
+
+
+def _switch_off_again(block, wrt, off):
+    """What was off at every time that the model had stays off at the new ones."""
+    if not off:
+        return
+    times = TimeIndex(wrt)
+    for ctype in HYBRID:
+        for name, family in times.families(block.component_data_objects(ctype, descend_into=PLACES)).items():
+            if (ctype, name) in off:
+                for data in family.values():
+                    if data.active:
+                        data.deactivate()
 
 
 def _expand_disjunction(disjunction, home):
@@ -169,35 +189,3 @@ def _expand_disjunction(disjunction, home):
             disjuncts = apply_indexed_rule(disjunction, disjunction._init_rule, home, index)
             if disjuncts is not Disjunction.Skip:
                 disjunction[index] = disjuncts
-
-
-@contextmanager
-def restored_on_error(block, wrt):
-    """Take back points, indices and components added to ``block`` if an error comes out of the body."""
-    points, boundaries, info = list(wrt), list(wrt._fe), dict(wrt._discretization_info)
-    names = ComponentMap((b, set(b.component_map())) for b in block.block_data_objects(descend_into=PLACES))
-    indices = ComponentMap((c, set(c._data)) for c in block.component_objects(descend_into=PLACES) if c.is_indexed())
-    derivatives = [c for c in block.component_objects(DerivativeVar, descend_into=PLACES)]
-    expressions = [d.get_derivative_expression() for d in derivatives]
-    try:
-        yield
-    except Exception:
-        for b, known in names.items():
-            for name in set(b.component_map()) - known:
-                b.del_component(name)
-        for component, known in indices.items():
-            for index in set(component._data) - known:
-                del component._data[index]
-            component.__dict__.pop('_dae_missing_idx', None)
-        for derivative, expression in zip(derivatives, expressions):
-            derivative.set_derivative_expression(expression)
-            if derivative.ctype is not DerivativeVar:
-                derivative.parent_block().reclassify_component_type(derivative, DerivativeVar)
-        block.__dict__.pop('_pyomo_dae_reclassified_derivativevars', None)
-        for point in set(wrt) - set(points):
-            wrt.remove(point)
-        wrt._fe = boundaries
-        wrt.set_changed(False)
-        wrt._discretization_info.clear()
-        wrt._discretization_info.update(info)
-        raise

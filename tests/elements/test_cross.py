@@ -76,6 +76,21 @@ def test_two_states_that_are_complementary_themselves_switch_at_their_time(schem
     assert m.x[2].value == pytest.approx(relay_of_states.FINAL, abs=1e-9)
 
 
+@pytest.mark.parametrize('scheme', SCHEMES)
+def test_a_weir_in_a_block_over_time_flows_over_at_its_time(scheme):
+    m = weir.build()
+    m.del_component(m.overflow)
+
+    @m.Block(m.t)
+    def crest(b, t):
+        b.overflow = Complementarity(expr=complements(weir.V_MAX - m.V[t] >= 0, m.F[t] >= 0))
+
+    solve(move(m, 5, 2, scheme=scheme))
+    assert list(block(m).family) == ['crest.overflow']
+    (switch,) = pyomo_fesd.switches(m)
+    assert switch.time == pytest.approx(weir.SWITCH, abs=1e-8)
+
+
 def test_a_condition_that_skips_the_first_time_is_aggregated_without_it():
     m = weir.build()
     m.del_component(m.overflow)
