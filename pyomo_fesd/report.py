@@ -1,12 +1,14 @@
 """The size of a model: what is in it, and what was left out."""
 
 import pandas as pd
-from pyomo.core import Block, Constraint
+from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.core import Block, Constraint, Objective
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
+from pyomo_fesd.complementarity import Mixed, read
 
 
 class Report(dict):
@@ -30,32 +32,37 @@ def report(model):
         conditions over time that the pairs stand for), ``disjunctions`` (transformed) and ``modes left out`` (switched-off
         disjuncts, which leave no multiplier)
     """
-    variables, constraints = {}, 0
-    for con in model.component_data_objects(Constraint, active=True, descend_into=Block):
-        constraints += 1
-        variables.update((id(v), v) for v in identify_variables(con.body, include_fixed=False))
+    constraints = list(model.component_data_objects(Constraint, active=True, descend_into=Block))
     conditions = list(model.component_data_objects(Complementarity, active=True, descend_into=Block))
-    for condition in conditions:
-        for side in condition._args:
-            variables.update((id(v), v) for v in identify_variables(side, include_fixed=False))
-    decided = sum(1 for pair, _ in marks.marked(model, marks.DECIDED) if pair.active)
-    sleeping = [
-        c for c in model.component_data_objects(Complementarity, descend_into=Block) if not c.active and c.parent_component()
-    ]
-    disjunctions = [d for d in model.component_data_objects(Disjunction, descend_into=Block) if not d.active]
-    left_out = sum(
-        1 for d in disjunctions for mode in d.disjuncts if mode.transformation_block is None and not mode.active
-    )
+    deciding = ComponentMap(marks.marked(model, marks.DECIDED))
+    decided = sum(1 for c in conditions if c in deciding)
+    mixed = sum(1 for c in conditions if isinstance(read(c), Mixed))
+    objectives = model.component_data_objects(Objective, active=True, descend_into=Block)
+    expressions = [c.body for c in constraints] + [o.expr for o in objectives] + [s for c in conditions for s in c._args]
+    variables = ComponentSet(v for e in expressions for v in identify_variables(e, include_fixed=False))
+    own = (c for c in model.component_data_objects(Complementarity, descend_into=Block) if not c.active and c not in deciding)
+    disjunctions = [d for d in model.component_data_objects(Disjunction, descend_into=Block) if _transformed(d)]
     return Report(
         {
-            'variables': len(variables),
-            'multipliers': sum(1 for v in variables.values() if marks.is_generated(v)),
-            'constraints': constraints,
-            'pairs': len(conditions) - decided,
+            # a condition between two bounds becomes two pairs, with the two parts of its function
+            'variables': len(variables) + 2 * mixed,
+            'multipliers': sum(1 for v in variables if marks.is_generated(v)),
+            'constraints': len(constraints) + mixed,
+            'pairs': len(conditions) - decided + mixed,
             'decided': decided,
-            'binaries at most': len(conditions) - decided,
-            'sources': len(sleeping),
+            'binaries at most': len(conditions) - decided + mixed,
+            'sources': sum(1 for c in own if getattr(c, '_args', None) is not None and not _is_equilibration(c)),
             'disjunctions': len(disjunctions),
-            'modes left out': left_out,
+            'modes left out': sum(1 for d in disjunctions for mode in d.disjuncts if mode.transformation_block is None),
         }
     )
+
+
+def _transformed(disjunction):
+    """Whether ``fesd.dcs`` has taken the place of a Disjunction."""
+    return not disjunction.active and any(mode.transformation_block is not None for mode in disjunction.disjuncts)
+
+
+def _is_equilibration(condition):
+    """Whether an inactive condition is one of step equilibration that another option switched off."""
+    return condition.parent_component().local_name == 'equilibration' and marks.is_generated(condition)

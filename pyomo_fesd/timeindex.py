@@ -10,6 +10,10 @@ from pyomo.gdp import Disjunct
 from pyomo_fesd.errors import FesdError
 
 
+#: Endings of the names of pyomo.dae's own equations.
+DISCRETISATION = ('_disc_eq', '_cont_eq')
+
+
 def is_indexed_by(component, wrt):
     """Whether ``wrt`` is one of the index sets of ``component`` itself."""
     return component.is_indexed() and any(s is wrt for s in component.index_set().subsets())

@@ -10,8 +10,8 @@ from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
-from pyomo_fesd.complementarity import read
-from pyomo_fesd.elements.grid import read_grid
+from pyomo_fesd.complementarity import Mixed, read
+from pyomo_fesd.elements.grid import ONE_ELEMENT_SCHEMES, read_grid
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set, strip_time
@@ -111,12 +111,15 @@ def trajectory(model, wrt=None):
 
 
 def _number(expr):
-    result = None if expr is None else value(expr, exception=False)
+    try:
+        result = None if expr is None else value(expr, exception=False)
+    except (ArithmeticError, ValueError):
+        result = None
     return np.nan if result is None else result
 
 
 def _elements(wrt, times):
-    if not discretised(wrt) or 'tau_points' not in wrt.get_discretization_info():
+    if not discretised(wrt) or wrt.get_discretization_info()['scheme'] not in ONE_ELEMENT_SCHEMES:
         return [0] * len(times)
     owner = _grid(wrt).element_of()
     return [owner[t].n if t in owner else 1 for t in times]
@@ -131,18 +134,18 @@ def _multipliers(model, index):
         for t, disjunction in family.items():
             for i, disjunct in enumerate(disjunction.disjuncts, start=1):
                 if disjunct in weights:
-                    modes.setdefault(_mode_name(disjunction, disjunct, i), {})[t] = weights[disjunct]
+                    modes.setdefault(_mode_name(disjunction, disjunct, i, index), {})[t] = weights[disjunct]
         if modes:
             found[strip_time(name)] = modes
     return found
 
 
-def _mode_name(disjunction, disjunct, number):
-    """The Disjunct's own name; a mode written as a list of expressions is called by its number."""
+def _mode_name(disjunction, disjunct, number, index):
+    """The Disjunct's own name without time; a mode written as a list of expressions is called by its number."""
     component = disjunct.parent_component()
     if component is disjunction.parent_component()._autodisjuncts:
         return f'mode {number}'
-    return component.local_name
+    return strip_time(index.split(disjunct)[1].split('.')[-1])
 
 
 def switches(model, wrt=None):
@@ -156,13 +159,14 @@ def switches(model, wrt=None):
         list of ``Switch(time, disjunction, before, after)``
     """
     wrt = find_continuous_set(model, wrt, 'switches')
-    times, grid, index = physical_time(model, wrt), _grid(wrt), TimeIndex(wrt)
-    systems = _multipliers(model, index) | _conditions(model, index)
-    found = Switches()
+    grid, index, found = _grid(wrt), TimeIndex(wrt), Switches()
+    times, systems = physical_time(model, wrt), _multipliers(model, index) | _conditions(model, wrt, index)
     for name, modes in systems.items():
         before = None
         for element in grid.elements:
             active = _active(modes, element)
+            if active is None:
+                continue
             if before is not None and active != before:
                 found.append(Switch(times[element.left], name, before, active))
             before = active
@@ -170,23 +174,30 @@ def switches(model, wrt=None):
 
 
 def _active(modes, element):
-    """The mode with a positive multiplier inside an element; several of them slide."""
+    """The mode with a positive multiplier inside an element; several slide; None where nothing tells."""
     on = [
         mode
         for mode, weights in modes.items()
         if any(t in weights and value(weights[t]) > CLEAR for t in element.points)
     ]
-    return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on) if on else 'none'
+    if not on:
+        return None
+    return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on)
 
 
-def _conditions(model, index):
-    """Hand-written complementarities as systems of two modes, named by the side that is positive."""
+def _conditions(model, wrt, index):
+    """Hand-written complementarities as systems of two modes, named by the side that is positive.
+
+    Those that ``fesd.finite_elements`` has aggregated are inactive but at the first time; others that are inactive are off.
+    """
     own = (c for c in model.component_data_objects(Complementarity, descend_into=Block) if not marks.is_generated(c))
-    found = {}
+    moving, found = wrt in records(model).grids, {}
     for name, family in index.families(own).items():
-        sides = {t: read(c) for t, c in family.items()}
-        found[strip_time(name)] = {
-            'G > 0': {t: pair.G for t, pair in sides.items()},
-            'H > 0': {t: pair.H for t, pair in sides.items()},
-        }
+        in_use = any(c.active for c in family.values())
+        sides = {t: read(c) for t, c in family.items() if moving or c.active}
+        if in_use and not any(isinstance(s, Mixed) for s in sides.values()):
+            found[strip_time(name)] = {
+                'G > 0': {t: pair.G for t, pair in sides.items()},
+                'H > 0': {t: pair.H for t, pair in sides.items()},
+            }
     return found

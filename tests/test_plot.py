@@ -87,8 +87,9 @@ def test_the_name_of_an_indexed_variable_takes_all_its_columns():
 
 
 def test_a_name_is_not_taken_for_the_beginning_of_another():
-    m = run(gas_liquid_tank.build(), nfe=10)
-    (axis,) = pyomo_fesd.plot(m, m.t, ['M_G']).axes
+    m = states(collocation)
+    m.xy = pyo.Var(m.t, initialize=2)
+    (axis,) = pyomo_fesd.plot(m, m.t, ['x']).axes
     assert len(curves(axis)) == 1 and axis.get_legend() is None
 
 
@@ -129,6 +130,15 @@ def test_a_slide_is_drawn():
     m = run(sliding.build(), nfe=5)
     pieces = curves(pyomo_fesd.plot(m, m.t, ['friction: rising']).axes[0])
     assert pieces[-1].get_ydata() == pytest.approx([0.5] * 3, abs=1e-8)
+
+
+@pytest.mark.parametrize('name', ['element', 'label'])
+def test_a_variable_with_the_name_of_an_own_column_does_not_spoil_the_picture(name):
+    m = signum.build()
+    m.add_component(name, pyo.Var(m.t, initialize=5.0))
+    run(m, nfe=5)
+    pieces = curves(pyomo_fesd.plot(m, m.t, ['sgn: below']).axes[0])
+    assert [p.get_xdata()[-1] for p in pieces] == pytest.approx(pyomo_fesd.element_lengths(m)['end'].tolist())
 
 
 # Ordinary models

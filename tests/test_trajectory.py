@@ -15,7 +15,7 @@ from pyomo_fesd import FesdError
 from pyomo_fesd.trajectory import Switch, Switches
 from tests.models import dcs
 from tests.problems import crossing, free_start, relay_of_states, sliding, two_systems, weir
-from tests.problems.running import EXACT_SCHEMES, LEGENDRE, RADAU, SCHEMES, move, run, solve, transform
+from tests.problems.running import EXACT_SCHEMES, LEGENDRE, RADAU, move, run, solve, transform
 
 
 @pytest.fixture(scope='module')
@@ -195,9 +195,11 @@ def test_an_expression_that_cannot_be_evaluated_is_nan():
     m.y = pyo.Var(m.t, initialize=lambda m, t: t)
     m.inverse = pyo.Expression(m.t, rule=lambda m, t: 1 / m.y[t])
     m.logarithm = pyo.Expression(m.t, rule=lambda m, t: pyo.log(m.y[t] - 1))
+    m.root = pyo.Expression(m.t, rule=lambda m, t: (m.y[t] - 1) ** 0.5)
     frame = pyomo_fesd.trajectory(m)
     assert np.isnan(frame['inverse'].iloc[0]) and frame['inverse'].iloc[1] == 0.5
     assert np.isnan(frame['logarithm'].iloc[0]) and frame['logarithm'].iloc[1] == 0
+    assert np.isnan(frame['root'].iloc[0]) and frame['root'].iloc[1] == 1
 
 
 @pytest.mark.parametrize('kind', GRIDS)
@@ -270,6 +272,12 @@ def test_a_condition_of_the_users_own_is_told_as_one_switch(scheme, ncp, slack_f
     sides = ('G > 0', 'H > 0') if slack_first else ('H > 0', 'G > 0')
     assert [(s.disjunction, s.before, s.after) for s in found] == [('overflow', *sides)]
     assert found[0].time == pytest.approx(weir.SWITCH, abs=1e-8)
+
+
+def test_a_condition_that_skips_the_first_time_is_told_too():
+    m = solve(move(weir.build(first_time=False), 5, 2))
+    (switch,) = pyomo_fesd.switches(m)
+    assert switch.time == pytest.approx(weir.SWITCH, abs=1e-8)
 
 
 def test_conditions_with_further_indices_are_told_one_by_one():

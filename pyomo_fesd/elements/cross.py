@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
-from pyomo.core import Block, ConstraintList, RangeSet, Set, quicksum
+from pyomo.core import Block, Constraint, ConstraintList, RangeSet, Set, quicksum
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
 from pyomo_fesd.complementarity import Mixed, read
 from pyomo_fesd.errors import FesdError
-from pyomo_fesd.timeindex import TimeIndex, derivatives, strip_time
+from pyomo_fesd.timeindex import DISCRETISATION, TimeIndex, derivatives, strip_time
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -101,7 +101,9 @@ def read_families(block, wrt, controls):
     continuous = ComponentSet(rules)
     continuous.update(d.get_state_var() for d in derivatives(block.model(), wrt))
     held = ComponentSet(controls)
-    datas = block.component_data_objects(Complementarity, active=True, descend_into=Block)
+    datas = list(block.component_data_objects(Complementarity, active=True, descend_into=Block))
+    if not all(map(marks.is_generated, datas)):
+        continuous.update(_defined_by_states(block.model(), times, wrt, continuous))
     families = []
     for name, conditions in times.families(datas).items():
         sides = {t: read(c) for t, c in conditions.items()}
@@ -112,13 +114,36 @@ def read_families(block, wrt, controls):
                 "a complementarity over time with two bounds on one side is not supported yet",
                 "write it as two conditions: l <= x perp F+ and x <= u perp F-, with F = F+ - F-",
             )
-        inner = next((t for t in sides if t != wrt.first()), None)
+        inner = next((t for t in wrt if t in sides and t != wrt.first()), None)
         smooth = tuple(_is_continuous(s, continuous) for s in sides[inner]) if inner is not None else (False, False)
         if smooth == (True, False):
             sides, smooth = {t: (H, G) for t, (G, H) in sides.items()}, (False, True)
         rule = _rule(sides[inner][1], rules) if smooth[1] else None
         families.append(Family(_public_name(name), conditions, sides, smooth, rule, _contains(rule, held)))
     return families
+
+
+def _defined_by_states(model, times, wrt, continuous):
+    """Algebraic variables at one inner time that equations tie to continuous ones: such a variable is continuous itself.
+
+    An equation with one unknown among continuous variables makes the unknown continuous; repeated until nothing is new.
+    """
+    t, known = list(wrt)[1], ComponentSet()
+    equations = [
+        list(identify_variables(c.body))
+        for c in model.component_data_objects(Constraint, active=True, descend_into=Block)
+        if c.equality and times.time(c) == t and not c.parent_component().local_name.endswith(DISCRETISATION)
+    ]
+
+    def unknown(v):
+        return times.time(v) is not None and v not in known and v not in continuous and v.parent_component() not in continuous
+
+    found = True
+    while found:
+        open_variables = ([v for v in variables if unknown(v)] for variables in equations)
+        found = [vs[0] for vs in open_variables if len(vs) == 1]
+        known.update(found)
+    return known
 
 
 def _rule(side, rules):
@@ -160,9 +185,8 @@ def _is_continuous(expr, continuous):
 def add_cross_complementarity(block, families, grid, wrt, form):
     """Put the aggregated pairs on ``block`` and switch the sources off."""
     block.family = Set(initialize=[f.name for f in families], ordered=True)
-    stages = RangeSet(len(grid.tau))
-    labels = RangeSet(len(grid.tau) + 2)
-    block.cross = Complementarity(block.family, block.element, *(stages, labels)[: FORMS[form]])
+    points = RangeSet(len(grid.tau) + 2)  # the stages, and both boundaries of a continuous side
+    block.cross = Complementarity(block.family, block.element, *[points] * FORMS[form])
     for family in families:
         for element in grid.elements:
             for index, (G, H) in _pairs(family, element, grid.right_is_stage, form):

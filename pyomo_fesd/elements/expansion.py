@@ -34,7 +34,7 @@ from pyomo.mpec import Complementarity
 from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.marks import is_generated
-from pyomo_fesd.timeindex import TimeIndex, derivatives, is_indexed_by, strip_time
+from pyomo_fesd.timeindex import DISCRETISATION, TimeIndex, derivatives, is_indexed_by, strip_time
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -61,7 +61,7 @@ def discretise(block, wrt, nfe, ncp, scheme):
     Raises
     ------
     FesdError
-        for components over time that cannot be expanded; the model is then as it was.
+        for components over time that cannot be expanded, and rules that fail at a new time
     """
     _check(block, wrt)
     with restored_on_error(block, wrt), PauseGC():
@@ -70,13 +70,25 @@ def discretise(block, wrt, nfe, ncp, scheme):
         try:
             with hybrid_expansion(block, wrt):
                 TransformationFactory('dae.collocation').apply_to(block, wrt=wrt, nfe=nfe, ncp=ncp, scheme=scheme)
+            _ask_missing_constraints(block, wrt)
         except KeyError as error:
             raise FesdError(
                 wrt,
                 f"a rule failed at a new time: {error}",
-                "if this model is a clone, its rules may still refer to the original: use d.model().x[t] instead of m.x[t]",
+                "give its data for all times; if this model is a clone, its rules may still refer to the original: use "
+                "d.model().x[t] instead of m.x[t]",
             ) from error
     _warn_unfixed(inputs)
+
+
+def _ask_missing_constraints(block, wrt):
+    """Pyomo takes a KeyError in a Constraint's rule for a Skip; ask once more, so that no equation is lost in silence."""
+    for component in block.component_objects(Constraint, descend_into=PLACES):
+        own = component.local_name.endswith(DISCRETISATION) or is_generated(component)
+        if is_indexed_by(component, wrt) and component.rule is not None and not own:
+            for index in component.index_set():
+                if index not in component._data:
+                    component.rule(component.parent_block(), index)
 
 
 def place_boundaries(wrt, nfe):
@@ -114,8 +126,7 @@ def _check(block, wrt):
         if not is_indexed_by(component, wrt) or is_generated(component):
             continue
         if component.ctype in HYBRID:
-            rule = component._init_rule if component.ctype is not Disjunct else component._rule
-            if rule is None and len(component):
+            if _rule(component) is None and len(component):
                 raise FesdError(
                     component,
                     f"this {component.ctype.__name__} over time was filled by hand: it has no rule for new times",
@@ -129,12 +140,17 @@ def _check(block, wrt):
             )
 
 
+def _rule(component):
+    """The rule by which a hybrid component gets its indices."""
+    return component._rule if component.ctype is Disjunct else component._init_rule
+
+
 @contextmanager
 def hybrid_expansion(block, wrt):
     """While this lasts, pyomo.dae's discretisation of ``wrt`` expands Disjuncts, Disjunctions and Complementarities."""
     hybrid = [c for c in block.component_objects(HYBRID, descend_into=PLACES) if c.parent_component() is c]
     off = _switched_off(block, wrt)
-    aside = [c for c in hybrid if c.ctype is Disjunction or is_generated(c) or not c.index_set().isfinite()]
+    aside = [c for c in hybrid if c.ctype is Disjunction or is_generated(c) or not c.index_set().isfinite() or _without(c)]
     waiting = ComponentMap((c, None) for c in aside)
     # pyomo.dae passes over Suffixes, and so over whatever bears their type; nothing changes its place in the model
     passing = [(c, c.ctype, Suffix if c in waiting else Block) for c in hybrid]
@@ -147,9 +163,14 @@ def hybrid_expansion(block, wrt):
         for component, ctype, _ in passing:
             component.parent_block().reclassify_component_type(component, ctype)
     for component in aside:
-        if component.ctype is Disjunction and is_indexed_by(component, wrt):
+        if component.ctype is Disjunction and is_indexed_by(component, wrt) and component._init_rule is not None:
             _expand_disjunction(component, component.parent_block())
     _switch_off_again(block, wrt, off)
+
+
+def _without(component):
+    """Whether an indexed component has neither rule nor data: nothing to expand."""
+    return component.is_indexed() and _rule(component) is None and not len(component)
 
 
 def _switched_off(block, wrt):

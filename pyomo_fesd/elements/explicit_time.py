@@ -1,33 +1,32 @@
 """Data that depend on time labels become wrong when elements move: find them and point to a clock state."""
 
 import logging
+from functools import partial
+from math import isfinite
 
 from pyomo.core import Block, Constraint, value
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.timeindex import TimeIndex, strip_time
+from pyomo.mpec import Complementarity
+
+from pyomo_fesd.complementarity import side
+from pyomo_fesd.timeindex import DISCRETISATION, TimeIndex, strip_time
 
 logger = logging.getLogger('pyomo_fesd')
 
-#: pyomo.dae's own equations, which contain the labels rightly.
-DISCRETISATION = ('_disc_eq', '_cont_eq')
 
+def warn_explicit_time(block, wrt, grid, integrands):
+    """Warn once for each family of constraints, conditions or integrands whose numbers change over time.
 
-def warn_explicit_time(block, wrt, grid):
-    """Warn once for each family of constraints whose numbers change over time.
-
-    With all variables at one value, all points of a family that has no explicit time give the same number.  Control stages
+    With every variable at one value, all points of a family that has no explicit time give the same number.  Control stages
     may have data of their own, so points are compared within a stage.
+
+    Parameters
+    ----------
+    integrands : list of (Integral, function)
     """
-    stage = {t: e.stage for e in grid.elements for t in _spread([*e.points])}
-    constraints = (
-        c
-        for component in block.component_objects(Constraint, active=True, descend_into=Block)
-        if not component.local_name.endswith(DISCRETISATION)
-        for c in component.values()
-        if c.active
-    )
-    for name, family in TimeIndex(wrt).families(constraints).items():
+    stage = {t: e.stage for e in grid.elements for t in e.points}
+    for name, family in _families(block, wrt, grid, integrands).items():
         points = _spread([t for t in family if t in stage])
         if any(_differ([family[t] for t in points if stage[t] == s]) for s in {stage[t] for t in points}):
             logger.warning(
@@ -37,25 +36,50 @@ def warn_explicit_time(block, wrt, grid):
             )
 
 
+def _families(block, wrt, grid, integrands):
+    """``{name: {label: function that gives an expression}}`` of everything over time that a user's rule made."""
+    components = block.component_objects((Constraint, Complementarity), active=True, descend_into=Block)
+    datas = (d for c in components if not c.local_name.endswith(DISCRETISATION) for d in c.values() if d.active)
+    families = TimeIndex(wrt).families(datas)
+    found = {name: {t: partial(_expression, d) for t, d in family.items()} for name, family in families.items()}
+    for integral, rule in integrands:
+        if not integral.is_indexed():
+            points = _spread([t for e in grid.elements for t in e.points])
+            found[integral.name] = {t: partial(rule, integral.parent_block(), t) for t in points}
+    return found
+
+
+def _expression(data):
+    """One expression whose value tells the numbers of a constraint or condition."""
+    if data.ctype is Complementarity:
+        sides = [side(a) for a in getattr(data, '_args', None) or ()]
+        return sum((k + 1) * (s.body - (s.lower or 0) - (s.upper or 0)) for k, s in enumerate(sides))
+    bounds = [b for b in (data.lower, data.upper) if b is not None]
+    return data.body - sum(bounds)
+
+
 def _spread(points, most=12):
     """At most about a dozen of many points, spread over all of them."""
     return points[:: max(1, len(points) // most)]
 
 
-def _differ(constraints):
-    """Whether the constraints give different numbers where all variables have the same value."""
-    numbers = [n for n in map(_at_one_value, constraints) if n is not None]
+def _differ(expressions):
+    """Whether the expressions differ where all variables have the same values."""
+    numbers = [n for n in map(_at_fixed_values, expressions) if n is not None]
     return bool(numbers) and max(numbers) - min(numbers) > 1e-9 * max(1.0, *map(abs, numbers))
 
 
-def _at_one_value(constraint, number=0.7):
-    bounds = [b for b in (constraint.lower, constraint.upper) if b is not None]
-    body = constraint.body - (bounds[0] if bounds else 0)
+def _at_fixed_values(expression):
+    """Value where the k-th variable of the expression is 0.7 + 0.11 k; None where it has none."""
+    body = expression()
     kept = [(v, v.value, v.stale) for v in identify_variables(body, include_fixed=True)]
     try:
-        for v, _, _ in kept:
-            v.set_value(number, skip_validation=True)
-        return value(body, exception=False)
+        for k, (v, _, _) in enumerate(kept):
+            v.set_value(0.7 + 0.11 * k, skip_validation=True)
+        number = value(body, exception=False)
+        return number if isinstance(number, (int, float)) and isfinite(number) else None
+    except (ArithmeticError, ValueError):
+        return None
     finally:
         for v, old, stale in kept:
             v.set_value(old, skip_validation=True)

@@ -8,6 +8,7 @@ discretisation equations stay, as other tools look them up.
 from pyomo.core import Constraint, RangeSet, Set, Var
 from pyomo.core.expr.visitor import replace_expressions
 
+from pyomo_fesd.errors import FesdError
 from pyomo_fesd.marks import ARTIFICIAL, mark
 from pyomo_fesd.timeindex import TimeIndex, derivatives
 
@@ -45,6 +46,13 @@ def discretisation_equations(model, wrt):
         equations = derivative.parent_block().component(derivative.local_name + '_disc_eq')
         if equations is not None:
             yield derivative, order, equations
+
+
+def check_orders(model, wrt):
+    """A second BACKWARD difference reaches over two elements; collocation stays inside one."""
+    for derivative, order, _ in discretisation_equations(model, wrt):
+        if order > 1 and wrt.get_discretization_info()['scheme'] == 'BACKWARD Difference':
+            raise FesdError(derivative, "a second BACKWARD difference joins two elements", "use collocation, or a state for the rate")
 
 
 def multiply_derivatives(model, wrt, block, grid):

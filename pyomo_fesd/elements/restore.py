@@ -7,12 +7,16 @@ from pyomo.core import Block, Expression, Suffix
 from pyomo.dae import DerivativeVar, Integral
 from pyomo.gdp import Disjunct
 
+from pyomo_fesd.records import records
+
 PLACES = (Block, Disjunct)
 
 
 @contextmanager
 def restored_on_error(block, wrt):
-    """Take back points, indices, components, types and marks added to ``block`` if an error comes out of the body."""
+    """Take back points, indices, components, types, marks and records added to the model if an error comes out of the body."""
+    block, record = block.model(), records(block)
+    repeats, grids = list(record.repeats), ComponentMap(record.grids.items())
     points, boundaries, info = list(wrt), list(wrt._fe), dict(wrt._discretization_info)
     names = ComponentMap((b, set(b.component_map())) for b in block.block_data_objects(descend_into=PLACES))
     indices = ComponentMap((c, set(c._data)) for c in block.component_objects(descend_into=PLACES) if c.is_indexed())
@@ -34,6 +38,7 @@ def restored_on_error(block, wrt):
             component.__dict__.pop('_dae_missing_idx', None)
         for component, was in active:
             component._active = was
+        record.repeats, record.grids = repeats, grids
         _restore_points(wrt, points, boundaries, info)
         _restore_types(block, derivatives, integrals)
         raise
@@ -66,4 +71,5 @@ def _restore_types(block, derivatives, integrals):
             integral.clear()
             integral._constructed = False
             integral.construct()
-    block.__dict__.pop('_pyomo_dae_reclassified_derivativevars', None)
+    for b in block.block_data_objects(descend_into=Block):
+        b.__dict__.pop('_pyomo_dae_reclassified_derivativevars', None)

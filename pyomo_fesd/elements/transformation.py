@@ -15,11 +15,12 @@ from pyomo_fesd.elements.cross import (
     warn_gauss_on_curved_surfaces,
 )
 from pyomo_fesd.elements.equilibration import MODES, add_equilibration
-from pyomo_fesd.elements.expansion import discretise, restored_on_error
+from pyomo_fesd.elements.expansion import discretise
 from pyomo_fesd.elements.explicit_time import warn_explicit_time
 from pyomo_fesd.elements.grid import check_resolution, read_grid
-from pyomo_fesd.elements.lengths import add_lengths, multiply_derivatives
+from pyomo_fesd.elements.lengths import add_lengths, check_orders, multiply_derivatives
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
+from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set
 
@@ -126,32 +127,35 @@ class FiniteElements(Transformation):
         with restored_on_error(instance, wrt):
             stages = self._discretise(instance, wrt, config)
             grid = read_grid(wrt, stages)
+            check_orders(instance.model(), wrt)
             families = read_families(instance, wrt, config.piecewise_constant)
+            waiting = next(_active_disjunctions(instance, wrt), None)
+            if waiting is not None and not families:
+                raise FesdError(
+                    waiting, "an active Disjunction over time", "apply fesd.dcs first: its complementarity finds the switches"
+                )
             integrands = [(i, integrand(i)) for i in integrals(instance.model(), wrt)]
-        warn_explicit_time(instance, wrt, grid)
-        if not grid.right_is_stage:
-            warn_gauss_on_curved_surfaces(families)
+            warn_explicit_time(instance, wrt, grid, integrands)
+            if not grid.right_is_stage:
+                warn_gauss_on_curved_surfaces(families)
 
-        block = self._block(instance, wrt)
-        add_lengths(block, grid, config.length_bounds)
-        multiply_derivatives(instance.model(), wrt, block, grid)
-        add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
-        if families:
-            add_equilibration(block, families, grid, config.equilibration, config.rho)
-        else:
-            block.r.fix(1)
-        for integral, rule in integrands:
-            rebuild(integral, rule, block, grid)
-        hold_controls(block, config.piecewise_constant, grid, wrt)
+            block = self._block(instance, wrt)
+            add_lengths(block, grid, config.length_bounds)
+            for integral, rule in integrands:
+                rebuild(integral, rule, block, grid)
+            hold_controls(block, config.piecewise_constant, grid, wrt)
+            multiply_derivatives(instance.model(), wrt, block, grid)
+            add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
+            if families:
+                add_equilibration(block, families, grid, config.equilibration, config.rho)
+            else:
+                block.r.fix(1)
 
     @staticmethod
     def _check(instance, wrt, config):
         if wrt in records.records(instance).grids:
             raise FesdError(wrt, "its elements are movable already", "apply fesd.finite_elements once for each ContinuousSet")
         check_controls(config.piecewise_constant, wrt)
-        waiting = next(_active_disjunctions(instance, wrt), None)
-        if waiting is not None:
-            raise FesdError(waiting, "an active Disjunction over time", "apply fesd.dcs first: its complementarity finds the switches")
         if discretised(wrt):
             return
         if config.stages is not None:

@@ -56,6 +56,16 @@ def test_a_weir_whose_level_is_an_algebraic_variable_flows_over_at_its_time(sche
         assert m.V[t].value == pytest.approx(min(now, weir.V_MAX), abs=1e-8)
 
 
+@pytest.mark.parametrize('scheme, ncp', EXACT_SCHEMES)
+def test_a_weir_whose_level_follows_from_coupled_equations_is_right_or_warned_of(scheme, ncp, caplog):
+    m = move(weir.build(level='coupled'), 5, ncp, scheme=scheme)
+    results = pyo.SolverFactory('mpec_hybrid').solve(m)
+    if not pyo.check_optimal_termination(results) or any('overflow' in r.message for r in caplog.records):
+        return
+    for t, now in pyomo_fesd.physical_time(m).items():
+        assert m.V[t].value == pytest.approx(min(now, weir.V_MAX), abs=1e-8)
+
+
 @pytest.mark.parametrize('scheme', SCHEMES)
 def test_two_weirs_in_series_flow_over_one_after_the_other(scheme):
     m = solve(move(weir.build_series(), 9, 2, scheme=scheme))
@@ -92,13 +102,7 @@ def test_a_weir_in_a_block_over_time_flows_over_at_its_time(scheme):
 
 
 def test_a_condition_that_skips_the_first_time_is_aggregated_without_it():
-    m = weir.build()
-    m.del_component(m.overflow)
-    m.overflow = Complementarity(
-        m.t,
-        rule=lambda m, t: Complementarity.Skip if t == 0 else complements(weir.V_MAX - m.V[t] >= 0, m.F[t] >= 0),
-    )
-    solve(move(m, 5, 2))
+    m = solve(move(weir.build(first_time=False), 5, 2))
     assert m.V[2].value == pytest.approx(weir.V_MAX, abs=1e-9)
     times = pyomo_fesd.physical_time(m)
     assert min(abs(times[label] - weir.SWITCH) for label in m.t.get_finite_elements()) <= 1e-9

@@ -59,6 +59,10 @@ def test_an_inequality_with_time_is_named(caplog):
     assert warned(signum_with(lambda m, t: pyo.inequality(t, m.y[t], 10)), caplog) == ['extra']
 
 
+def test_bounds_that_open_with_time_are_named(caplog):
+    assert warned(signum_with(lambda m, t: pyo.inequality(-t, m.y[t], t)), caplog) == ['extra']
+
+
 def test_time_in_front_of_a_difference_of_variables_is_named(caplog):
     assert warned(signum_with(lambda m, t: m.y[t] == t * (m.x[t] - m.z[t])), caplog) == ['extra']
 
@@ -105,6 +109,14 @@ def test_time_in_an_integrand_is_named(caplog):
     m.integral = dae.Integral(m.t, wrt=m.t, rule=lambda m, t: t * m.x[t])
     m.cost = pyo.Objective(expr=m.integral)
     assert warned(m, caplog) == ['integral']
+
+
+def test_time_in_an_indexed_integrand_is_named(caplog):
+    m = signum.build()
+    m.moment = dae.Integral(m.t, [1, 2], wrt=m.t, rule=lambda m, t, k: t**k * m.x[t])
+    m.cost = pyo.Objective(expr=m.moment[1])
+    found = warned(m, caplog)
+    assert found and all(name.startswith('moment') for name in found)
 
 
 @PLACES

@@ -77,7 +77,7 @@ def test_any_stages_are_found_again(gaps, each, ncp, scheme):
     points = tuple(float(p) for p in np.cumsum([0, *gaps]) / 100)
     g, t = grid(points, nfe=each * len(gaps), ncp=ncp, scheme=scheme)
     assert [len(elements) for elements in g.stages.values()] == [each] * len(gaps)
-    for (stage, elements), left, right in zip(g.stages.items(), points, points[1:]):
+    for elements, left, right in zip(g.stages.values(), points, points[1:]):
         assert (elements[0].left, elements[-1].right) == (left, right)
         assert [e.opens_stage for e in elements] == [True] + [False] * (each - 1)
         assert [e.length for e in elements] == pytest.approx([(right - left) / each] * each, abs=2e-6)

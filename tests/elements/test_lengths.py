@@ -16,7 +16,6 @@ from tests.models import dcs
 from tests.problems import crossing, double_integrator, free_start, held_control, weir
 from tests.problems.running import LEGENDRE, RADAU, SCHEMES, lengths, move, multipliers, run, solve, transform
 
-
 # Sums
 
 

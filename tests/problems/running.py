@@ -45,7 +45,7 @@ def multipliers(wrt):
 
 
 def seen(m):
-    """``snapshot`` without the order of declaration in each block and without stale flags, which Pyomo keeps for all models at once."""
+    """``snapshot`` and marks, without the order of declaration and without stale flags, which Pyomo has for all models."""
     found = {}
     for key, value in snapshot(m).items():
         if key[1:] == ('components',):

@@ -2,7 +2,7 @@
 
 import pyomo.dae as dae
 import pyomo.environ as pyo
-from pyomo.gdp import Disjunct, Disjunction
+from pyomo.gdp import Disjunction
 
 SWITCH, NU = 0.5, 0.5
 CURVED = {'switch': (3**0.5 - 1) / 2, 'x': -(0.45**2), 'nu': 0.05}  # the curved slide, x and nu at its end

@@ -1,4 +1,4 @@
-"""Two independent Disjunctions over one time: x of ``signum`` (switch at 2/3) and y, dy/dt = -sgn y, y(0) = 1/2 (slides from 1/2 on)."""
+"""Two independent Disjunctions: ``signum`` with its switch at 2/3, and dy/dt = -sgn y, y(0) = 1/2, which slides from t = 1/2 on."""
 
 import pyomo.dae as dae
 import pyomo.environ as pyo

@@ -11,8 +11,12 @@ SWITCH = V_MAX = 0.7
 OVERFLOW = 1.0  # after the switch
 
 
-def build(level='state', slack_first=True):
-    """``level``: the slack is that of the state V ('state') or of an algebraic variable h = 2 V ('algebraic')."""
+def build(level='state', slack_first=True, first_time=True):
+    """The slack is that of the state V (``level='state'``) or of an algebraic variable h = 2 V.
+
+    h has an equation of its own ('algebraic'), or two equations tie it to another algebraic variable ('coupled').
+    Without ``first_time`` the condition begins after t = 0.
+    """
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, 2))
     m.V = pyo.Var(m.t, initialize=0)
@@ -20,13 +24,20 @@ def build(level='state', slack_first=True):
     m.dV = dae.DerivativeVar(m.V)
     m.V[0].fix(0)
     m.balance = pyo.Constraint(m.t, rule=lambda m, t: m.dV[t] == 1 - m.F[t])
-    if level == 'algebraic':
+    if level != 'state':
         m.h = pyo.Var(m.t, initialize=0)
+    if level == 'algebraic':
         m.cylinder = pyo.Constraint(m.t, rule=lambda m, t: m.h[t] == 2 * m.V[t])
+    if level == 'coupled':
+        m.foam = pyo.Var(m.t, initialize=0)
+        m.sum = pyo.Constraint(m.t, rule=lambda m, t: m.h[t] + m.foam[t] == 3 * m.V[t])
+        m.difference = pyo.Constraint(m.t, rule=lambda m, t: m.h[t] - m.foam[t] == m.V[t])
 
     @m.Complementarity(m.t)
     def overflow(m, t):
-        slack = (2 * V_MAX - m.h[t] if level == 'algebraic' else V_MAX - m.V[t]) >= 0
+        if t == 0 and not first_time:
+            return Complementarity.Skip
+        slack = (V_MAX - m.V[t] if level == 'state' else 2 * V_MAX - m.h[t]) >= 0
         return complements(slack, m.F[t] >= 0) if slack_first else complements(m.F[t] >= 0, slack)
 
     return m
