@@ -106,7 +106,7 @@ def draw(panels, trapped):
         for path in paths:
             axis.plot(*path.T, '.-', color='C0', linewidth=0.8, markersize=5, alpha=0.6)
         axis.plot(*STARTS.T, 'o', color='C0', markersize=5, markerfacecolor='white')
-        for (name, end), number in zip(ENDS.items(), count(paths).values()):
+        for end, number in zip(ENDS.values(), count(paths).values()):
             axis.annotate(number, end, (-10, -10), textcoords='offset points', ha='center', va='center', weight='bold')
         axis.set(title=title, aspect='equal', xlim=(-0.2, 2.1), ylim=(-0.2, 2.1))
     figure.axes[0].plot(*trapped.T, '.-', color='C3')

@@ -72,10 +72,9 @@ def _draw(axis, frame, column, wrt):
     if ': ' not in column:
         axis.plot(frame.index, frame[column], '.-', markersize=3, linewidth=1.2, label=label)
         return
-    color = axis._get_lines.get_next_color()
-    boundaries = read_grid(wrt, [wrt.first(), wrt.last()]).elements
-    for k, element in enumerate(boundaries):
-        part = frame[frame['element'] == element.n]
-        left = frame.index[frame['label'] == element.left][0]
-        time, values = [left, *part.index], [part[column].iloc[0], *part[column]]
+    color, row = axis._get_lines.get_next_color(), {t: k for k, t in enumerate(wrt)}
+    for k, element in enumerate(read_grid(wrt, [wrt.first(), wrt.last()]).elements):
+        inside = [row[t] for t in dict.fromkeys((*element.points, element.right))]
+        values = frame[column].iloc[[inside[0], *inside]]
+        time = frame.index[[row[element.left], *inside]]
         axis.plot(time, values, '-', color=color, linewidth=1.2, label=label if k == 0 else None)

@@ -9,7 +9,6 @@ from pyomo.gdp import Disjunct
 
 from pyomo_fesd.errors import FesdError
 
-
 #: Endings of the names of pyomo.dae's own equations.
 DISCRETISATION = ('_disc_eq', '_cont_eq')
 

@@ -4,13 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from pyomo.common.collections import ComponentMap
+from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Expression, Var, value
 from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
 from pyomo_fesd.complementarity import Mixed, read
+from pyomo_fesd.elements.cross import sources
 from pyomo_fesd.elements.grid import ONE_ELEMENT_SCHEMES, read_grid
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.records import records
@@ -115,7 +116,7 @@ def _number(expr):
         result = None if expr is None else value(expr, exception=False)
     except (ArithmeticError, ValueError):
         result = None
-    return np.nan if result is None else result
+    return np.nan if result is None or isinstance(result, complex) else result
 
 
 def _elements(wrt, times):
@@ -191,10 +192,11 @@ def _conditions(model, wrt, index):
     Those that ``fesd.finite_elements`` has aggregated are inactive but at the first time; others that are inactive are off.
     """
     own = (c for c in model.component_data_objects(Complementarity, descend_into=Block) if not marks.is_generated(c))
-    moving, found = wrt in records(model).grids, {}
+    block, found = records(model).grids.get(wrt), {}
+    moved = ComponentSet(c for conditions in sources(block).values() for c in conditions) if block is not None else ()
     for name, family in index.families(own).items():
-        in_use = any(c.active for c in family.values())
-        sides = {t: read(c) for t, c in family.items() if moving or c.active}
+        in_use = any(c.active or c in moved for c in family.values())
+        sides = {t: read(c) for t, c in family.items() if block is not None or c.active}
         if in_use and not any(isinstance(s, Mixed) for s in sides.values()):
             found[strip_time(name)] = {
                 'G > 0': {t: pair.G for t, pair in sides.items()},

@@ -116,6 +116,12 @@ def read_families(block, wrt, controls):
             )
         inner = next((t for t in wrt if t in sides and t != wrt.first()), None)
         smooth = tuple(_is_continuous(s, continuous) for s in sides[inner]) if inner is not None else (False, False)
+        if inner is not None and not any(smooth):
+            logger.warning(
+                "%s: neither side is known to be continuous in time, so a switch inside an element may go unnoticed. Write one "
+                "side by differential states, or by a variable that one equation ties to them.",
+                _public_name(name),
+            )
         if smooth == (True, False):
             sides, smooth = {t: (H, G) for t, (G, H) in sides.items()}, (False, True)
         rule = _rule(sides[inner][1], rules) if smooth[1] else None

@@ -6,7 +6,6 @@ from math import isfinite
 
 from pyomo.core import Block, Constraint, value
 from pyomo.core.expr.visitor import identify_variables
-
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd.complementarity import side
@@ -43,9 +42,11 @@ def _families(block, wrt, grid, integrands):
     families = TimeIndex(wrt).families(datas)
     found = {name: {t: partial(_expression, d) for t, d in family.items()} for name, family in families.items()}
     for integral, rule in integrands:
-        if not integral.is_indexed():
-            points = _spread([t for e in grid.elements for t in e.points])
-            found[integral.name] = {t: partial(rule, integral.parent_block(), t) for t in points}
+        index = next(iter(integral.index_set())) if integral.is_indexed() else ()
+        index = index if isinstance(index, tuple) else (index,)
+        before, after = index[: integral.loc], index[integral.loc :]
+        points = _spread([t for e in grid.elements for t in e.points])
+        found[integral.name] = {t: partial(rule, integral.parent_block(), *before, t, *after) for t in points}
     return found
 
 
@@ -53,9 +54,10 @@ def _expression(data):
     """One expression whose value tells the numbers of a constraint or condition."""
     if data.ctype is Complementarity:
         sides = [side(a) for a in getattr(data, '_args', None) or ()]
-        return sum((k + 1) * (s.body - (s.lower or 0) - (s.upper or 0)) for k, s in enumerate(sides))
+        parts = [part for s in sides for part in s if part is not None]
+        return sum((k + 1) * part for k, part in enumerate(parts))
     bounds = [b for b in (data.lower, data.upper) if b is not None]
-    return data.body - sum(bounds)
+    return data.body - sum((k + 1) * b for k, b in enumerate(bounds))
 
 
 def _spread(points, most=12):

@@ -52,7 +52,7 @@ def check_orders(model, wrt):
     """A second BACKWARD difference reaches over two elements; collocation stays inside one."""
     for derivative, order, _ in discretisation_equations(model, wrt):
         if order > 1 and wrt.get_discretization_info()['scheme'] == 'BACKWARD Difference':
-            raise FesdError(derivative, "a second BACKWARD difference joins two elements", "use collocation, or a state for the rate")
+            raise FesdError(derivative, "a second BACKWARD difference joins two elements", "use collocation, or a rate as a state")
 
 
 def multiply_derivatives(model, wrt, block, grid):

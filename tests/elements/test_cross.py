@@ -101,6 +101,18 @@ def test_a_weir_in_a_block_over_time_flows_over_at_its_time(scheme):
     assert switch.time == pytest.approx(weir.SWITCH, abs=1e-8)
 
 
+def test_a_weir_may_have_a_mutable_param_as_its_height():
+    m = weir.build()
+    m.del_component(m.overflow)
+    m.height = pyo.Param(initialize=weir.V_MAX, mutable=True)
+    m.overflow = Complementarity(m.t, rule=lambda m, t: complements(m.V[t] <= m.height, m.F[t] >= 0))
+    solve(move(m, 5, 2))
+    assert m.V[2].value == pytest.approx(weir.V_MAX, abs=1e-9)
+    m.height = 0.9
+    solve(m)
+    assert m.V[2].value == pytest.approx(0.9, abs=1e-9)
+
+
 def test_a_condition_that_skips_the_first_time_is_aggregated_without_it():
     m = solve(move(weir.build(first_time=False), 5, 2))
     assert m.V[2].value == pytest.approx(weir.V_MAX, abs=1e-9)
