@@ -31,8 +31,9 @@ class DynamicComplementaritySystem(Transformation):
 
         v = sum_i nu_i f_i,   sum_i nu_i = 1,   nu_i >= 0,   nu_i = 0 outside the closure of R_i
 
-    with the conditions on nu as complementarity in the smallest form that fits: eq. (5) for two modes, eq. (3) for more.  An equation that all modes share is not blended; a mode that is switched off leaves nothing; if only one mode is
-    left, its constraints hold as they are.
+    with the conditions on nu as complementarity in the smallest form that fits: eq. (5) for two modes, eq. (3) for more.
+    An equation that all modes share is not blended; a mode that is switched off leaves nothing; if only one mode is left, its
+    constraints hold as they are.
 
     Works on a model before and after discretisation.  On a model that is not discretised yet, the later expansion by
     ``fesd.finite_elements`` continues with the new times.
