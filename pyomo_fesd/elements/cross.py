@@ -9,12 +9,15 @@ Does not apply: to complementarities without time.
 import logging
 from dataclasses import dataclass
 
+import numpy as np
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
 from pyomo.core import Block, Constraint, ConstraintList, RangeSet, Set, quicksum
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from pyomo_fesd import marks
 from pyomo_fesd.complementarity import Mixed, read
@@ -132,24 +135,38 @@ def read_families(block, wrt, controls):
 def _defined_by_states(model, times, wrt, continuous):
     """Algebraic variables at one inner time that equations tie to continuous ones: such a variable is continuous itself.
 
-    An equation with one unknown among continuous variables makes the unknown continuous; repeated until nothing is new.
+    They are the unknowns of the equations that are not under-determined (Dulmage and Mendelsohn): those that no alternating path
+    connects with an unmatched unknown.
     """
-    t, known = list(wrt)[1], ComponentSet()
-    equations = [
-        list(identify_variables(c.body))
+    t = list(wrt)[1]
+
+    def unknown(v):
+        return times.time(v) is not None and v not in continuous and v.parent_component() not in continuous
+
+    rows = [
+        [v for v in identify_variables(c.body) if unknown(v)]
         for c in model.component_data_objects(Constraint, active=True, descend_into=Block)
         if c.equality and times.time(c) == t and not c.parent_component().local_name.endswith(DISCRETISATION)
     ]
-
-    def unknown(v):
-        return times.time(v) is not None and v not in known and v not in continuous and v.parent_component() not in continuous
-
-    found = True
-    while found:
-        open_variables = ([v for v in variables if unknown(v)] for variables in equations)
-        found = [vs[0] for vs in open_variables if len(vs) == 1]
-        known.update(found)
-    return known
+    columns = ComponentMap()
+    for row in rows:
+        for v in row:
+            columns.setdefault(v, len(columns))
+    places = [(i, columns[v]) for i, row in enumerate(rows) for v in row]
+    if not places:
+        return ComponentSet()
+    incidence = csr_matrix((np.ones(len(places)), tuple(zip(*places))), shape=(len(rows), len(columns)))
+    row_of = maximum_bipartite_matching(incidence, perm_type='row')  # of each column, -1 if unmatched
+    column_of = {i: j for j, i in enumerate(row_of) if i >= 0}
+    by_column, loose = incidence.tocsc(), {j for j, i in enumerate(row_of) if i < 0}
+    waiting = list(loose)
+    while waiting:
+        j = waiting.pop()
+        for i in by_column.indices[by_column.indptr[j] : by_column.indptr[j + 1]]:
+            if column_of[i] not in loose:
+                loose.add(column_of[i])
+                waiting.append(column_of[i])
+    return ComponentSet(v for v, j in columns.items() if j not in loose)
 
 
 def _rule(side, rules):

@@ -26,7 +26,7 @@ def restored_on_error(block, wrt):
     integrals = list(block.component_objects(Integral, descend_into=PLACES))
     try:
         yield
-    except Exception:
+    except BaseException:  # Ctrl-C too
         for suffix, known in marks.items():
             _keep_keys(suffix, known)
         for b, known in names.items():

@@ -64,7 +64,7 @@ def sort_sides(c):
 def _least(A, lower, upper):
     """Which bound each variable takes where A w is least (csr of 1: lower, 2: upper), and that least value."""
     bound = np.where(A.data > 0, lower[A.indices], upper[A.indices])
-    product = np.where(A.data == 0, 0.0, A.data * bound)
+    product = A.data * np.where(A.data == 0, 0.0, bound)
     least = np.zeros(A.shape[0])
     np.add.at(least, np.repeat(np.arange(A.shape[0]), np.diff(A.indptr)), product)
     direction = sparse.csr_matrix((np.where(A.data > 0, 1.0, 2.0), A.indices, A.indptr), shape=A.shape)
