@@ -101,7 +101,8 @@ class HybridSolver:
 
     def _homotopy(self):
         options = self._options
-        w, eps, form, previous, failures = self._c.x0, options.eps_init, self._forms[0], None, 0
+        form, *others = self._forms
+        w, eps, previous, failures = self._c.x0, options.eps_init, None, 0
         while True:
             self.run.eps = eps
             relaxed = self._relax(form, w, eps)
@@ -124,7 +125,12 @@ class HybridSolver:
                     return
             exhausted = self._tried[sets.zero.tobytes()] >= TRIES and np.max(at.G * at.H, initial=0.0) <= EXHAUSTED
             if last or (exhausted and sets.same_sides(previous)):
-                return
+                if self.run.point is not None or not others:
+                    return
+                # nothing feasible at the end of this form's path: the other form takes another one
+                w, eps, form, previous = self._c.x0, options.eps_init, others.pop(0), None
+                self._tried.clear()
+                continue
             previous, eps = sets, max(eps * options.eps_factor, options.eps_final)
 
     def _usable(self, result):
