@@ -1,0 +1,153 @@
+"""One instance by one method, in a child process of ``mpcc.py``: the rows of its table."""
+
+import os
+import time
+from functools import lru_cache
+from pathlib import Path
+
+import mpcc_baselines
+import mpcc_check
+import numpy as np
+from mpcc_instance import Instance
+from pyomo.common.collections import ComponentMap
+from pyomo.common.timing import HierarchicalTimer
+from pyomo.contrib.solver.common.factory import SolverFactory
+
+import pyomo_fesd  # noqa: F401  registers mpec_hybrid
+from pyomo_fesd.mpcc.compile import compile_problem
+from pyomo_fesd.mpcc.problem import read_problem
+
+METHODS = ('hybrid', *mpcc_baselines.HOMOTOPIES)
+PHASES = ('compile', 'build', 'relaxation', 'branch', 'lpec')
+COLUMNS = f"""
+set instance method n rows pairs sense best_known
+status certified solved b_stationary
+time total {' '.join(PHASES)}
+nlps iterations lpecs binaries eps_last
+violation complementarity objective gap lpec_value lpec_binaries moved
+error
+""".split()
+#: A point is solved when both residuals of the instance's reader are below this.
+SOLVED = 1e-6
+
+
+def serve(pipe):
+    """Answer each (path, method, limit) with two rows, the second with the verdict from outside; what is printed is lost."""
+    silent = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silent, 1)
+    os.dup2(silent, 2)
+    while True:
+        path, method, limit = pipe.recv()
+        row = {'set': Path(path).parent.name, 'instance': Path(path).stem, 'method': method}
+        try:
+            d = _load(path)
+            row |= {'n': d['n'], 'rows': len(d['con']), 'pairs': len(d['comp'])}
+            row |= {'sense': 1 if d['sense'] == 'min' else -1, 'best_known': d.get('best_known')}
+            found, x = (_hybrid if method == 'hybrid' else _baseline)(path, method, limit)
+            row |= found
+            if x is not None:
+                row |= _measure(d, x)
+        except Exception as error:
+            row |= {'status': 'exception', 'error': f'{type(error).__name__}: {error}'[:200]}
+        pipe.send(row)
+        if row.get('solved'):
+            try:
+                verdict = mpcc_check.check(_functions(path), x)
+                row |= {'b_stationary': verdict.b_stationary, 'lpec_value': verdict.value}
+                row |= {'lpec_binaries': verdict.binaries, 'moved': verdict.moved}
+            except Exception as error:
+                row |= {'error': f'check: {type(error).__name__}: {error}'[:200]}
+        pipe.send(row)
+
+
+@lru_cache(1)
+def _load(path):
+    import mpcc_json  # beside the instances
+
+    return mpcc_json.load(path)
+
+
+@lru_cache(1)
+def _functions(path):
+    return Instance(_load(path))
+
+
+@lru_cache(1)
+def _compiled(path):
+    """The model and its compiled form, both shared by the baselines; ``mpec_hybrid`` has a fresh model and compiles itself."""
+    import mpcc_json
+
+    m = mpcc_json.to_pyomo(_load(path))
+    return m, compile_problem(read_problem(m), HierarchicalTimer())
+
+
+def _point(d, m, values):
+    """Variables in the instance's order; those that stand nowhere in the model keep their start."""
+    start = np.clip(d['x0'], d['lb'], d['ub'])
+    return np.array([values.get(v, start[j]) for j, v in m.x.items()], dtype=float)
+
+
+def _measure(d, x):
+    """Residuals, objective, and how much worse than the best known it is (negative: better)."""
+    import mpcc_json
+
+    r = _residuals(mpcc_json, d, x)
+    row = {'violation': r['feas'], 'complementarity': r['comp'], 'objective': r['obj']}
+    row['solved'] = bool(r['feas'] <= SOLVED and r['comp'] <= SOLVED)
+    best = d.get('best_known')
+    if best is not None:
+        row['gap'] = (r['obj'] - best) * (1 if d['sense'] == 'min' else -1) / max(1.0, abs(best))
+    return row
+
+
+def _residuals(mpcc_json, d, x):
+    """Those of the reader; infinite where the instance cannot be evaluated."""
+    try:
+        return mpcc_json.residuals(d, x.tolist())
+    except (ArithmeticError, ValueError, TypeError):
+        return {'feas': np.inf, 'comp': np.inf, 'obj': np.nan}
+
+
+def _baseline(path, method, limit):
+    import mpcc_json
+
+    d, (m, c) = _load(path), _compiled(path)
+
+    def point(w):
+        return _point(d, m, ComponentMap(zip(c.variables, w)))
+
+    def judge(w):
+        r = _residuals(mpcc_json, d, point(w))
+        return r['feas'], r['comp']
+
+    answer = mpcc_baselines.solve(method, c, judge, limit)
+    row = {name: getattr(answer, name) for name in ('status', 'nlps', 'iterations')}
+    row |= {'eps_last': answer.last, 'time': answer.seconds, 'total': answer.seconds}
+    return row, point(answer.w)
+
+
+def _hybrid(path, method, limit):
+    import mpcc_json
+
+    d = _load(path)
+    m = mpcc_json.to_pyomo(d)
+    started = time.perf_counter()
+    options = {'time_limit': limit, 'raise_exception_on_nonoptimal_result': False, 'load_solutions': False}
+    results = SolverFactory('mpec_hybrid').solve(m, **options)
+    total = time.perf_counter() - started
+    info, timer = results.extra_info, results.timing_info.timer
+    row = {name: _seconds(timer, name) for name in PHASES}
+    row |= {'status': results.termination_condition.name, 'certified': info.stationarity == 'B', 'total': total}
+    row |= {'time': total - row['compile'], 'iterations': info.nlp_iterations}
+    row |= {name: getattr(info, name) for name in ('nlps', 'lpecs', 'binaries', 'eps_last')}
+    if not results.solution_loader.get_number_of_solutions():
+        return row, None
+    return row, _point(d, m, results.solution_loader.get_vars())
+
+
+def _seconds(timer, name):
+    """Time in a phase; 0 for one that did not happen."""
+    try:
+        return timer.get_total_time(name)
+    except (KeyError, RuntimeError):
+        return 0.0
