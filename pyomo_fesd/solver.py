@@ -40,6 +40,7 @@ from pyomo_fesd.mpcc.lpec import Lpec
 from pyomo_fesd.mpcc.problem import read_problem
 from pyomo_fesd.mpcc.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.run import Outcome, Tolerances
+from pyomo_fesd.mpcc.sides import sort_sides
 from pyomo_fesd.mpcc.stationarity import certify as certify_point
 from pyomo_fesd.mpcc.table import Table
 
@@ -79,13 +80,13 @@ class MpecHybridConfig(SolverConfig):
             ),
             ('relaxation_tol', 1e-6, PositiveFloat, "Ipopt's tol for relaxations, which only lead to a branch"),
             ('relaxation_iterations', 500, PositiveInt, "Ipopt iterations allowed to one relaxation"),
-            ('gap_tol', 1e-3, PositiveFloat, "gap test: relative distance of the incumbent to the relaxed objective that ends the run"),
+            ('gap_tol', 5e-5, PositiveFloat, "gap test: relative distance of the incumbent to the relaxed objective that ends the run"),
             ('feasibility_tol', 1e-6, PositiveFloat, "largest scaled violation and complementarity of a reported point"),
             ('biactive_tol', 1e-6, PositiveFloat, "sides below this are both zero at a branch solution (eq. 16)"),
             ('descent_tol', 1e-6, PositiveFloat, "LPEC value, relative to max(1, |f|), that counts as no descent"),
             ('eta_tol', 1e-3, PositiveFloat, "indicator of step equilibration above which nothing has switched (eq. 13)"),
             ('trust_radius', 1.0, PositiveFloat, "trust region Delta of the LPEC, relative for large variables (eq. 17)"),
-            ('branch_tol', 1e-11, PositiveFloat, "Ipopt's tol for branch NLPs"),
+            ('branch_tol', 1e-9, PositiveFloat, "Ipopt's tol for branch NLPs"),
             ('branch_iterations', 300, PositiveInt, "Ipopt iterations allowed to one branch NLP; a wrong branch burns them all"),
             ('max_iterations', 20000, PositiveInt, "Ipopt iterations allowed in all"),
         ):
@@ -105,7 +106,7 @@ class _Loader(SolutionLoader):
     """
 
     def __init__(self, model, compiled, run):
-        self._pyomo_model, self._c, self._w = model, compiled, run.w
+        self._pyomo_model, self._c, self._w = model, compiled, None if run.w is None else compiled.values(run.w)
         self._nlp = None if run.point is None else run.point.nlp
 
     def get_number_of_solutions(self):
@@ -122,13 +123,13 @@ class _Loader(SolutionLoader):
         """Multipliers of the constraints in the branch NLP, in Pyomo's sign; the pairs are fixed there."""
         if self._nlp is None:
             raise NoDualsError()
-        return _select(dict, self._c.constraints, -self._c.sign * self._nlp.lam_g, cons_to_load)
+        return _select(dict, self._c.constraints, -self._c.sign * self._nlp.lam_g[: len(self._c.constraints)] * self._c.scale.g / self._c.scale.f, cons_to_load)
 
     def get_reduced_costs(self, vars_to_load=None):
         """Multipliers of the bounds in the branch NLP, in Pyomo's sign."""
         if self._nlp is None:
             raise NoReducedCostsError()
-        return _select(ComponentMap, self._c.variables, -self._c.sign * self._nlp.lam_x, vars_to_load)
+        return _select(ComponentMap, self._c.variables, -self._c.sign * self._nlp.lam_x * self._c.scale.x / self._c.scale.f, vars_to_load)
 
     def load_vars(self, vars_to_load=None):
         super().load_vars(vars_to_load)
@@ -240,7 +241,7 @@ def _fill(results, model, c, run):
     results.termination_condition, results.solution_status = condition, status
     results.solution_loader = _Loader(model, c, run)
     if run.point is not None and c.has_objective:
-        results.incumbent_objective = c.sign * run.point.f
+        results.incumbent_objective = c.objective(run.point.f)
     info = results.extra_info
     info.outcome = run.outcome.value
     certificate = None if run.point is None else run.point.certificate
@@ -324,10 +325,11 @@ def certify(model, **options):
     """
     config = MpecHybrid.CONFIG(value=options)
     compiled = compile_problem(read_problem(model), HierarchicalTimer())
+    lpec = Lpec(compiled, sort_sides(compiled), config.lpec_options.value())
     tolerances = Tolerances(
         config.feasibility_tol, config.biactive_tol, config.descent_tol, config.eta_tol, config.trust_radius
     )
-    certificate = certify_point(compiled, Lpec(compiled, config.lpec_options.value()), compiled.x0, tolerances)
+    certificate = certify_point(compiled, lpec, compiled.x0, tolerances)
     if certificate.lpec is None:
         return certificate
     return replace(certificate, direction=ComponentMap(zip(compiled.variables, map(float, certificate.lpec.d))))

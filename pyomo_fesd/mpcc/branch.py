@@ -10,14 +10,21 @@ Does not apply: where the bounds of an assignment contradict each other; ``solve
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
+from pyomo_fesd.mpcc.compiled import csr_pattern
 from pyomo_fesd.mpcc.nlp import Nlp
 
-#: A branch starts next to its solution: Ipopt must not push the start away from the bounds, far from it on badly scaled models.
-WARM = {'bound_push': 1e-8, 'bound_frac': 1e-8, 'mu_init': 1e-6}
-#: A row without free variables may miss its bounds by this much.
-ROW_TOLERANCE = 1e-8
+#: A branch starts near its solution, but neither so close to the bounds that Ipopt cannot turn, nor pushed far from them.
+NEAR = {
+    'mu_strategy': 'monotone',
+    'mu_init': 1e-4,
+    'bound_push': 1e-4,
+    'bound_frac': 1e-4,
+    'constr_viol_tol': 1e-11,
+    'compl_inf_tol': 1e-10,
+}
+#: A row without free variables, or one of more equations than free variables, may miss its bounds by this much.
+ROW_TOLERANCE = 1e-9
 
 
 class Branch:
@@ -36,11 +43,11 @@ class Branch:
         self._c, self._sides = c, sides
         weight = ca.SX.sym('weight')
         g = ca.vertcat(c.g, sides.rows, c.equal)
-        self._pattern = _csr_pattern(ca.jacobian(g, c.x))
-        self._values = ca.Function('rows', [c.x], [g])
-        self._nlp = Nlp('branch', c.x, weight, c.f + weight * c.penalty, g, WARM | options, deadline)
+        self._pattern = csr_pattern(ca.jacobian(g, c.x))
+        self._values = ca.Function('rows', [c.x, c.p], [g])
+        self._nlp = Nlp('branch', c.x, ca.vertcat(weight, c.p), c.f + weight * c.penalty, g, NEAR | options, deadline)
 
-    def solve(self, w, zero, equal=None, weight=0.0):
+    def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None):
         """Solve the branch ``zero`` from ``w``.
 
         Parameters
@@ -51,11 +58,17 @@ class Branch:
             decisions to impose
         weight : float
             1 to keep the penalty terms in the objective, 0 to leave them out
+        box : (array, array), optional
+            a trust region: bounds of w besides its own
+        duals : NlpResult, optional
+            a relaxation's or branch's result whose multipliers to start from
+        max_iter : int, optional
 
         Returns
         -------
         NlpResult, or None if the assignment contradicts the bounds
         """
+        c = self._c
         bounds = self._bounds(zero)
         if bounds is None:
             return None
@@ -64,7 +77,19 @@ class Branch:
         w = np.clip(w, lbx, ubx)
         if not self._drop_settled_rows(w, lbx == ubx, lbg, ubg):
             return None
-        return self._nlp.solve(w, [weight], lbx, ubx, lbg, ubg)
+        self._widen_surplus_equations(lbx == ubx, lbg, ubg)
+        if box is not None:
+            free = lbx < ubx
+            lbx, ubx = np.where(free, np.maximum(lbx, box[0]), lbx), np.where(free, np.minimum(ubx, box[1]), ubx)
+        return self._nlp.solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, self._start(duals), max_iter)
+
+    def _start(self, duals):
+        """Multipliers of a relaxation for the rows that a branch shares with it, zero for the others."""
+        if duals is None:
+            return None
+        rows, shared = len(self._c.lbg) + self._sides.rows.numel(), np.zeros(self._pattern.shape[0])
+        shared[:rows] = duals.lam_g[:rows]
+        return duals.with_multipliers(duals.lam_x[: len(self._c.x0)], shared)
 
     def _bounds(self, zero):
         c, sides = self._c, self._sides
@@ -91,13 +116,17 @@ class Branch:
         """Free the rows whose variables are all fixed; False if one of them is violated."""
         settled = (self._pattern @ (~fixed).astype(float)) == 0
         if settled.any():
-            g = np.asarray(self._values(w), dtype=float).ravel()[settled]
+            g = np.asarray(self._values(w, self._c.parameters), dtype=float).ravel()[settled]
             if np.any(g < lbg[settled] - ROW_TOLERANCE) or np.any(g > ubg[settled] + ROW_TOLERANCE):
                 return False
             lbg[settled], ubg[settled] = -np.inf, np.inf
         return True
 
+    @staticmethod
+    def _widen_surplus_equations(fixed, lbg, ubg):
+        """More equations than free variables: some depend on the others.  As narrow ranges Ipopt takes them."""
+        equations = lbg == ubg
+        if np.count_nonzero(equations) > np.count_nonzero(~fixed):
+            lbg[equations] -= ROW_TOLERANCE
+            ubg[equations] += ROW_TOLERANCE
 
-def _csr_pattern(J):
-    colptr, row = np.array(J.sparsity().colind()), np.array(J.sparsity().row())
-    return sparse.csc_matrix((np.ones(len(row)), row, colptr), shape=J.shape).tocsr()

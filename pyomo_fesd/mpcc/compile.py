@@ -8,83 +8,36 @@ eps nor a branch needs a rebuild.
 import os
 import tempfile
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from pyomo.common.collections import ComponentMap
+from pyomo.common.errors import InfeasibleConstraintException
 from pyomo.common.modeling import unique_component_name
-from pyomo.core import Block, ConstraintList, Objective, Suffix, VarList, maximize, value
+from pyomo.core import Block, ConstraintList, Objective, Suffix, VarList, maximize, quicksum, value
 from pyomo.core.expr import Expr_ifExpression, ExternalFunctionExpression, UnaryFunctionExpression
+from pyomo.repn import generate_standard_repn
 from pyomo.repn.plugins.nl_writer import NLWriter
-from scipy import sparse
 
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.mpcc.compiled import Compiled, Numbers, csr
+from pyomo_fesd.mpcc.parameters import symbols
 from pyomo_fesd.mpcc.problem import Condition
+from pyomo_fesd.mpcc.scaling import Scale, UserFactors, side_factors
 from pyomo_fesd.timeindex import refuse_foreign
 
 #: Nodes that casadi's NL reader cannot evaluate.
 UNSUPPORTED_NODES = (ExternalFunctionExpression, Expr_ifExpression)
+#: A bound that no sum reaches.
+ALWAYS = 1e300
 UNSUPPORTED_FUNCTIONS = ('asinh', 'acosh', 'atanh')
 
 
-@dataclass(frozen=True)
-class Evaluation:
-    """Values at one point w (numpy vectors; see ``Compiled``)."""
-
-    f: float
-    g: np.ndarray
-    G: np.ndarray
-    H: np.ndarray
-    eta: np.ndarray
+class Contradiction(Exception):
+    """The NL writer found a constraint that no value of the free variables can meet; the message names it."""
 
 
-class Compiled:
-    """The MPCC as numbers and functions.
-
-    Attributes
-    ----------
-    variables : list of VarData, length n
-    constraints : list of ConstraintData, length m (rows of g)
-    conditions : list of Condition, length q
-    decisions : list of Decision
-    x : SX (n);  f, penalty : SX scalars;  g : SX (m);  G, H : SX (q);  eta, equal : SX (one each decision)
-    side_of : int array (2q), equal numbers for equal sides among G (first q) and H
-    lbx, ubx : arrays (n), the variables' bounds with the signs that plain-variable sides imply
-    lbg, ubg : arrays (m)
-    artificial : bool array (n), variables whose bounds belong to the method
-    guide_ubx : array (n), upper bounds in the homotopy: those of such variables are tighter there
-    x0 : array (n), the model's values projected to the bounds
-    missing : int, number of variables without a value
-    sign : +1.0, or -1.0 for a model that maximises (f is always minimised)
-    has_objective : bool
-    """
-
-    def evaluate(self, w):
-        """f, g, G, H and eta at ``w``."""
-        f, g, G, H, eta = (np.asarray(v, dtype=float).ravel() for v in self._values(w))
-        return Evaluation(float(f[0]), g, G, H, eta)
-
-    def gradients(self, w):
-        """Gradient of f (array) and Jacobians of g, G, H and the decisions' equations (scipy csr) at ``w``."""
-        grad, *jacobians = self._gradients(w)
-        return np.asarray(grad, dtype=float).ravel(), *(_csr(J) for J in jacobians)
-
-    def violations(self, w, at=None):
-        """How much each row (m) and each bound (n) is violated at ``w``."""
-        at = at or self.evaluate(w)
-        rows = np.maximum(np.maximum(self.lbg - at.g, at.g - self.ubg), 0.0)
-        return rows, np.maximum(np.maximum(self.lbx - w, w - self.ubx), 0.0)
-
-
-def _csr(J):
-    """casadi DM to scipy csr."""
-    colptr, row = np.array(J.sparsity().colind()), np.array(J.sparsity().row())
-    data = np.array(J.nonzeros(), dtype=float)
-    return sparse.csc_matrix((data, row, colptr), shape=J.shape).tocsr()
-
-
-def compile_problem(problem, timer, folder=None):
+def compile_problem(problem, timer, folder=None, parameters=(), user_scaling=True):
     """Compile ``problem``.
 
     Parameters
@@ -93,29 +46,39 @@ def compile_problem(problem, timer, folder=None):
     timer : HierarchicalTimer
     folder : path, optional
         where the NL file is to be written and kept; default: a temporary one
+    parameters : list of VarData and ParamData
+        fixed variables and mutable Params whose values may change in later solves
+    user_scaling : bool
+        whether ``scaling_factor`` suffixes are honoured
 
     Raises
     ------
     FesdError
         naming the component with a function that cannot be evaluated, before anything is solved
+    Contradiction
+        where fixed values alone violate a constraint
     """
-    with _sides(problem) as (scratch, rows, conditions):
+    factors = UserFactors(problem.model, user_scaling)
+    with symbols(problem.model, parameters) as handles, _sides(problem, handles) as (scratch, rows, conditions):
         timer.start('write')
-        with tempfile.TemporaryDirectory() as temporary:
-            path = os.path.join(folder or temporary, 'model.nl')
-            with open(path, 'w', newline='') as stream:
-                info = _write(problem.model, stream)
-            timer.stop('write')
-            refuse_foreign(info.variables, problem.model.model(), problem.model)
-            timer.start('import')
-            nl = _import(problem.model, path)
-        compiled = _assemble(problem, conditions, rows, info, nl)
+        try:
+            with tempfile.TemporaryDirectory() as temporary:
+                path = os.path.join(folder or temporary, 'model.nl')
+                with open(path, 'w', newline='') as stream:
+                    info = _write(problem.model, stream)
+                timer.stop('write')
+                refuse_foreign(info.variables, problem.model.model(), problem.model)
+                timer.start('import')
+                nl = _import(problem.model, path)
+        except InfeasibleConstraintException as error:
+            raise Contradiction(str(error)) from None
+        compiled = _assemble(problem, conditions, rows, info, nl, handles, factors)
         timer.stop('import')
     return compiled
 
 
 @contextmanager
-def _sides(problem):
+def _sides(problem, handles):
     """A scratch block with a row for every expression that the MPCC needs; the pairs sleep while it exists."""
     model, scratch = problem.model, Block()
     model.add_component(unique_component_name(model, '_pyomo_fesd_scratch'), scratch)
@@ -131,18 +94,31 @@ def _sides(problem):
         conditions = problem.conditions + [c for source, m in problem.mixed for c in _split(scratch, source, m)]
         known = {}
         rows = {
-            'G': [_shared_row(scratch, c.G, known) for c in conditions],
-            'H': [_shared_row(scratch, c.H, known) for c in conditions],
+            'G': [_shared_row(scratch, handles.in_terms(c.G), known) for c in conditions],
+            'H': [_shared_row(scratch, handles.in_terms(c.H), known) for c in conditions],
             'eta': [_row(scratch, d.eta) for d in problem.decisions],
             'equal': [_row(scratch, d.constraint.body - d.constraint.upper) for d in problem.decisions],
             'penalty': [_row(scratch, weight * term.expr) for term, weight in problem.penalties],
+            'present': _presence(scratch, handles),
         }
+        rows['present'] += [_keep(scratch, rows['G'] + rows['H'])]
         yield scratch, rows, conditions
     finally:
         model.del_component(scratch)
         for suffix in suffixes:
             suffix.activate()
         _wake(asleep)
+
+
+def _presence(scratch, handles):
+    """Parameters that stand nowhere must be in the NL file all the same."""
+    return [_keep(scratch, handles.variables)]
+
+
+def _keep(scratch, components):
+    """A row that keeps variables in the NL file which stand in no other: the writer drops those."""
+    variables = [c for c in components if hasattr(c, 'is_variable_type') and c.is_variable_type()]
+    return scratch.row.add(quicksum(variables) <= ALWAYS) if variables else 0.0
 
 
 def _sleep(sources):
@@ -181,8 +157,11 @@ def _shared_row(scratch, expr, known):
 
 def _row(scratch, expr):
     """What stands for ``expr`` in the NL file: a number, a variable, or a row."""
-    if not hasattr(expr, 'is_fixed') or expr.is_fixed():
+    if not hasattr(expr, 'is_fixed'):
         return value(expr)
+    if expr.is_fixed():
+        # 0 * x is fixed although x may have no value
+        return generate_standard_repn(expr, compute_values=True).constant
     if expr.is_variable_type():
         return expr
     return scratch.row.add(expr >= 0)
@@ -239,47 +218,102 @@ def _nodes(expr):
             stack.extend(node.args)
 
 
-def _assemble(problem, conditions, rows, info, nl):
-    """Split the NL's rows into the model's own and those that we asked for, as functions of SX variables."""
-    x = ca.SX.sym('w', len(info.variables))
-    f, g = ca.Function('nl', [ca.vertcat(*nl.x)], [nl.f, ca.vertcat(*nl.g)]).expand()(x)
-    column = ComponentMap((v, j) for j, v in enumerate(info.variables))
+def _assemble(problem, conditions, rows, info, nl, handles, factors):
+    """Split the NL's rows into the model's own and those that we asked for, as one scaled function."""
+    columns = ComponentMap((v, j) for j, v in enumerate(info.variables))
     place = ComponentMap((c, i) for i, c in enumerate(info.constraints))
     lower, upper = np.array(nl.g_lb, dtype=float), np.array(nl.g_ub, dtype=float)
+    settable = [columns[v] for v in handles.variables]
+    free = np.setdiff1d(np.arange(len(info.variables)), settable)
+    variables = [info.variables[j] for j in free]
 
     taken = {place[r] for group in rows.values() for r in group if _is_row(r)}
     own = [i for i in range(len(info.constraints)) if i not in taken]
+    constraints = [handles.source(info.constraints[i]) for i in own]
+    sources = [c.source for c in conditions]
+
+    # the solver's variables, and the model's in terms of them
+    s_x, s_g = factors.of(variables), factors.of(constraints)
+    s_f = float(factors.of([problem.objective])[0])
+    w, p = ca.SX.sym('w', len(variables)), ca.SX.sym('p', len(settable))
+    x = ca.SX(len(info.variables), 1)
+    x[free.tolist()], x[settable] = w / s_x, p
+    f, g = ca.Function('nl', [ca.vertcat(*nl.x)], [nl.f, ca.vertcat(*nl.g)]).expand()(x)
 
     def sx(r):
         if _is_row(r):
             # constants of a linear row stand in its bound
             return g[place[r]] - lower[place[r]]
-        return x[column[r]] if r in column else ca.SX(value(r))
+        return x[columns[r]] if r in columns else ca.SX(value(r))
 
-    c = Compiled()
-    c.variables, c.constraints = info.variables, [info.constraints[i] for i in own]
-    c.conditions, c.decisions = conditions, problem.decisions
-    c.x, c.f = x, f
-    c.g = g[own] if own else ca.SX(0, 1)
-    c.lbg, c.ubg = lower[own], upper[own]
-    for name in ('G', 'H', 'eta', 'equal'):
-        setattr(c, name, ca.vertcat(*map(sx, rows[name])) if rows[name] else ca.SX(0, 1))
-    sides = rows['G'] + rows['H']
-    c.side_of = np.array([_number(k, r, place, column) for k, r in enumerate(sides)], dtype=int)
-    c.penalty = sum(map(sx, rows['penalty']), ca.SX(0))
-    c.lbx, c.ubx = np.array(nl.x_lb, dtype=float), np.array(nl.x_ub, dtype=float)
-    for r in rows['G'] + rows['H']:
-        if not _is_row(r) and r in column:
-            c.lbx[column[r]] = max(c.lbx[column[r]], 0.0)
-    guide = np.array([problem.artificial.get(v.parent_component(), np.inf) for v in info.variables], dtype=float)
-    c.artificial, c.guide_ubx = np.isfinite(guide), np.minimum(c.ubx, guide)
-    c.has_objective = problem.objective is not None
-    c.sign = -1.0 if c.has_objective and problem.objective.sense == maximize else 1.0
-    start = np.array([np.nan if v.value is None else v.value for v in info.variables], dtype=float)
-    c.missing = int(np.count_nonzero(~np.isfinite(start)))
-    c.x0 = np.clip(np.where(np.isfinite(start), start, 0.0), c.lbx, c.ubx)
-    c._values = ca.Function('values', [x], [f, c.g, c.G, c.H, c.eta])
-    c._gradients = ca.Function(
-        'gradients', [x], [ca.gradient(f, x), *(ca.jacobian(e, x) for e in (c.g, c.G, c.H, c.equal))]
+    def group(name):
+        return ca.vertcat(*map(sx, rows[name])) if rows[name] else ca.SX(0, 1)
+
+    names = rows['G'] + rows['H']
+    start, missing = _start(variables)
+    sides = ca.vertcat(group('G'), group('H'))
+    s_sides = _scale_sides(sides, w, p, names, start * s_x, handles, dict(zip(free, s_x)), columns, factors.of(sources * 2))
+    q = len(conditions)
+    sides = sides * s_sides
+    penalty = sum(map(sx, rows['penalty']), ca.SX(0))
+    own_rows = g[own] * s_g if own else ca.SX(0, 1)
+    parts = [f * s_f, penalty * s_f, own_rows, sides[:q], sides[q:], group('eta'), group('equal')]
+
+    side_of = np.array([_number(k, r, place, columns) for k, r in enumerate(names)], dtype=int)
+    kept = _distinct(side_of, q)
+    both = np.concatenate([kept, kept + q])
+    parts[3], parts[4] = parts[3][kept.tolist()], parts[4][kept.tolist()]
+    lbx, ubx = np.array(nl.x_lb, dtype=float)[free], np.array(nl.x_ub, dtype=float)[free]
+    plain = ComponentMap((v, j) for j, v in enumerate(variables))
+    for r in names:
+        if not _is_row(r) and r in plain:
+            lbx[plain[r]] = max(lbx[plain[r]], 0.0)
+    guide = np.array([problem.artificial.get(v.parent_component(), np.inf) for v in variables], dtype=float)
+    numbers = Numbers(
+        lbx=lbx * s_x,
+        ubx=ubx * s_x,
+        lbg=lower[own] * s_g,
+        ubg=upper[own] * s_g,
+        side_of=side_of[both],
+        artificial=np.isfinite(guide),
+        guide_ubx=np.minimum(ubx, guide) * s_x,
+        x0=np.clip(start, lbx, ubx) * s_x,
+        parameters=handles.values(),
+        missing=missing,
+        sign=-1.0 if problem.objective is not None and problem.objective.sense == maximize else 1.0,
+        has_objective=problem.objective is not None,
+        scale=Scale(s_x, s_g, s_f, s_sides[both]),
     )
-    return c
+    graph = ca.Function('mpcc', [w, p], parts)
+    return Compiled(graph, numbers, variables, constraints, [conditions[k] for k in kept], problem.decisions)
+
+
+def _start(variables):
+    """The variables' values, 0 where there is none, and how many there are not."""
+    start = np.array([np.nan if v.value is None else v.value for v in variables], dtype=float)
+    known = np.isfinite(start)
+    return np.where(known, start, 0.0), int(np.count_nonzero(~known))
+
+
+def _scale_sides(sides, w, p, names, w0, handles, s_x, columns, given):
+    """Factors of the sides: the variable's own for a plain variable, the user's or a mild gradient for an expression."""
+    if not sides.numel():
+        return np.ones(0)
+    J = csr(ca.Function('sides', [w, p], [ca.jacobian(sides, w)])(w0, handles.values()))
+    largest = np.abs(J).max(axis=1).toarray().ravel() if J.shape[1] else np.zeros(J.shape[0])
+    factors = side_factors(np.where(np.isfinite(largest), largest, 0.0), given)
+    for k, r in enumerate(names):
+        if not _is_row(r) and r in columns:
+            factors[k] = s_x.get(columns[r], 1.0)
+    return factors
+
+
+def _distinct(side_of, q):
+    """Positions of the pairs that are not there already, in whichever order of their sides."""
+    seen, kept = set(), []
+    for k in range(q):
+        pair = frozenset((side_of[k], side_of[k + q]))
+        if pair not in seen:
+            kept.append(k)
+        seen.add(pair)
+    return np.array(kept, dtype=int)

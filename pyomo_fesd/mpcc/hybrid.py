@@ -1,46 +1,36 @@
 """The hybrid active-set algorithm (theory, section 4): Reg(eps) -> active sets -> branch NLP -> certificate.
 
 Reg(eps) leads; as soon as its active sets look settled, the branch NLP that they name is solved: an exactly complementary point,
-which the LPEC certifies or from which it descends into a better branch.  The homotopy goes on while its objective lies clearly
-below the incumbent's (gap test), and eps may rise again when a relaxation fails.
+which the LPEC certifies or from which it descends into a better branch.  The homotopy goes on while its objective promises less
+than the incumbent's (gap test), and eps may rise again when a relaxation fails.
 """
 
-import time
 from collections import Counter
-from contextlib import contextmanager
 
 import numpy as np
 
 from pyomo_fesd.mpcc.active_set import active_sets
-from pyomo_fesd.mpcc.branch import Branch
-from pyomo_fesd.mpcc.lpec import Lpec
-from pyomo_fesd.mpcc.relaxation import RELAXATIONS
-from pyomo_fesd.mpcc.run import Outcome, Point, Run, Step, Tolerances
-from pyomo_fesd.mpcc.sides import sort_sides
-from pyomo_fesd.mpcc.stationarity import Stationarity, certify
+from pyomo_fesd.mpcc.gap import GapTest
+from pyomo_fesd.mpcc.recovery import LADDER
+from pyomo_fesd.mpcc.run import Outcome, Point, Run, Stop, Tolerances
+from pyomo_fesd.mpcc.stationarity import Stationarity
+from pyomo_fesd.mpcc.steps import Steps
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
-#: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
-BIACTIVE = 3.0
-#: Starts from which a branch NLP is tried before it counts as infeasible.
-TRIES = 3
+#: Attempts at a branch NLP before it counts as infeasible, and the iterations that the early ones may use.
+TRIES, EARLY = 3, 60
 #: With products below this and the same sides as before, a smaller eps shows nothing new.
 EXHAUSTED = 1e-8
+#: The trust region of a descent step shrinks by this, so often.
+SHRINK, SHRINKS = 0.1, 3
 #: A feasible point with variables beyond this has run away along an unbounded objective.
 UNBOUNDED = 1e15
+#: Branch-and-bound nodes for an LPEC that only suggests a branch.
+SUGGESTION = {'mip_max_nodes': 100}
 #: Without an objective any solution will do, and the elastic form is by far the quickest to one; with an objective it settles
 #: early in worse minima than Scholtes' (gas-liquid optimal control: 250.005 instead of 250).  A failure changes the form.
 AUTO = {False: ('elastic', 'scholtes'), True: ('scholtes', 'elastic')}
-#: After a failed relaxation: eps relative to its first value, and whether to start again from the model's values.
-RECOVERY = ((1e-2, True), (10.0, False), (1e-4, True), (100.0, True))
-
-
-class _Stop(Exception):
-    """A limit was reached; carries the outcome."""
-
-    def __init__(self, outcome):
-        self.outcome = outcome
 
 
 class HybridSolver:
@@ -59,29 +49,25 @@ class HybridSolver:
     """
 
     def __init__(self, compiled, options, timer, show, deadline=None):
-        self._c, self._options, self._timer, self._show, self._deadline = compiled, options, timer, show, deadline
+        self._c, self._options = compiled, options
         self._tolerances = Tolerances(
             options.feasibility_tol, options.biactive_tol, options.descent_tol, options.eta_tol, options.trust_radius
         )
-        ipopt = options.nlp_options.value()
-        timer.start('build')
-        self._sides = sort_sides(compiled)
-        budget = {'max_iter': options.branch_iterations, 'tol': options.branch_tol}
-        self._branch = Branch(compiled, self._sides, budget | ipopt, deadline)
-        timer.stop('build')
-        self._forms = [options.relaxation] if options.relaxation != 'auto' else AUTO[compiled.has_objective]
-        self._relaxations = {}
-        self._lpec = Lpec(compiled, options.lpec_options.value(), deadline)
-        self._tried = Counter()
         self.run = Run()
+        self._steps = Steps(compiled, options, self._tolerances, self.run, timer, show, deadline)
+        self._forms = (options.relaxation,) if options.relaxation != 'auto' else AUTO[compiled.has_objective]
+        self._gap = GapTest(options.gap_tol * 1e-2, options.gap_tol)
+        self._tried = Counter()
 
     def solve(self):
         """Run to a certified point or an honest end; returns the ``Run``."""
         run = self.run
         try:
             self._homotopy()
+            if run.point is None:
+                self._last_resort()
             run.outcome = self._verdict()
-        except _Stop as stop:
+        except Stop as stop:
             run.outcome = stop.outcome
         except KeyboardInterrupt:
             run.outcome = Outcome.INTERRUPTED
@@ -101,79 +87,96 @@ class HybridSolver:
 
     def _homotopy(self):
         options = self._options
-        form, *others = self._forms
-        w, eps, previous, failures = self._c.x0, options.eps_init, None, 0
+        form, ladder = 0, list(LADDER)
+        w, eps, duals, previous = self._c.x0, options.eps_init, None, None
         while True:
             self.run.eps = eps
-            relaxed = self._relax(form, w, eps)
+            relaxed = self._steps.relax(self._forms[form], w, eps, duals)
             self._keep_least_infeasible(relaxed.w)
-            if not self._usable(relaxed):
-                if failures == len(RECOVERY):
+            if not self._steps.usable(relaxed):
+                if not ladder:
                     return
-                factor, restart = RECOVERY[failures]
-                w = self._c.x0 if restart else relaxed.w
-                eps, failures, previous = options.eps_init * factor, failures + 1, None
-                form = self._forms[failures % len(self._forms)]
+                step = ladder.pop(0)
+                self._steps.note(step.what, relaxed.w)
+                w, eps = step.start(self._c.x0, relaxed.w, self), max(step.eps(options.eps_init, eps, options.eps_factor), options.eps_final)
+                form, duals, previous = (form + step.other_form) % len(self._forms), None, None
+                self._gap.restart()
                 continue
-            w = relaxed.w
+            w, duals = relaxed.w, relaxed
             at = self._c.evaluate(w)
-            sets = active_sets(at.G, at.H, self._biactive(at))
+            self._gap.add(eps, at.f)
+            sets = active_sets(at.G, at.H, self._steps.biactive(at))
             last = eps <= 1.001 * options.eps_final  # products of eps_factor carry round-off
+            exhausted = np.max(at.G * at.H, initial=0.0) <= EXHAUSTED and sets.same_sides(previous)
             if sets.same_sides(previous) or last or not sets.gamma.any():
-                self._explore(w, sets)
-                if self._settled(at.f):
+                self._explore(relaxed, sets, last or exhausted)
+                if self._settled():
                     return
-            exhausted = self._tried[sets.zero.tobytes()] >= TRIES and np.max(at.G * at.H, initial=0.0) <= EXHAUSTED
-            if last or (exhausted and sets.same_sides(previous)):
-                if self.run.point is not None or not others:
+            if last or (exhausted and self._tried[sets.zero.tobytes()] >= TRIES):
+                if self.run.point is not None or form + 1 == len(self._forms):
                     return
                 # nothing feasible at the end of this form's path: the other form takes another one
-                w, eps, form, previous = self._c.x0, options.eps_init, others.pop(0), None
+                self._steps.note("nothing feasible on this path, other form", w)
+                w, eps, duals, form, previous = self._c.x0, options.eps_init, None, form + 1, None
+                self._gap.restart()
                 self._tried.clear()
                 continue
             previous, eps = sets, max(eps * options.eps_factor, options.eps_final)
 
-    def _usable(self, result):
-        """Whether an NLP's point can lead on: solved, or stopped where its constraints hold."""
-        return result.solved or self._violation(result.w) <= self._tolerances.feasibility
-
-    def _violation(self, w):
-        rows, bounds = self._c.violations(w)
-        return float(max(rows.max(initial=0.0), bounds.max(initial=0.0)))
+    def restore(self, w):
+        """The nearest point that the feasibility phase finds, with pairs as loose as at the start."""
+        return self._steps.restore(w, self._options.eps_init).w
 
     def _keep_least_infeasible(self, w):
         """Remember the point to report if nothing feasible is found."""
-        if self.run.w is None or self._violation(w) < self._violation(self.run.w):
+        if self.run.w is None or self._steps.violation(w) < self._steps.violation(self.run.w):
             self.run.w = w
 
-    def _biactive(self, at):
-        """Below this both sides of a pair may be zero at the solution: O(sqrt) of the largest product left (eq. 16)."""
-        return max(BIACTIVE * np.sqrt(np.max(at.G * at.H, initial=0.0)), self._tolerances.biactive)
-
-    def _settled(self, f_relaxed):
-        """Gap test: the incumbent is good enough if the relaxed objective no longer lies clearly below it."""
+    def _settled(self):
         point = self.run.point
-        if point is None or not point.certificate.certified:
-            return False
-        return point.f - f_relaxed <= self._options.gap_tol * max(1.0, abs(point.f))
+        return point is not None and point.certificate.certified and self._gap.closed(point.f)
+
+    def _last_resort(self):
+        """Nothing feasible: the feasibility phase shows what contradicts, or a point to start one more branch from."""
+        nearest = self._steps.restore(self.run.w, self._options.eps_final)
+        self.run.w = nearest.w
+        at = self._c.evaluate(nearest.w)
+        self._tried.clear()
+        self._explore(None, active_sets(at.G, at.H, self._steps.biactive(at)), True)
 
     # branches
 
-    def _explore(self, w, sets):
+    def _explore(self, relaxed, sets, final):
         """Solve the branch that the active sets name; descend from it as long as the LPEC shows a way."""
-        zero = sets.zero
-        if sets.gamma.any() and self._c.has_objective:
-            zero = self._lpec_step(w, sets).zero
-        point = self._point(w, zero)
+        zero, w = sets.zero, self.run.w if relaxed is None else relaxed.w
+        if sets.gamma.any() and self._c.has_objective and self._tried[zero.tobytes()] < TRIES:
+            zero = self._steps.lpec(w, sets, self._tolerances.radius, limits=SUGGESTION).zero
+        point = self._point(w, zero, relaxed, final)
         while point is not None:
             self._keep(point)
-            if point.certificate.grade is not Stationarity.DESCENT:
-                return
-            step = point.certificate.lpec
-            better = self._point(point.w + step.d, step.zero)
-            if better is None or better.f > point.f - PROGRESS * max(1.0, abs(point.f)):
-                return
-            point = better
+            point = self._descend(point) if point.certificate.grade is Stationarity.DESCENT else None
+
+    def _descend(self, point):
+        """A better point in the branch of the LPEC's direction: from its end, or within ever smaller trust regions."""
+        enough = point.f - PROGRESS * max(1.0, abs(point.f))
+        step, w = point.certificate.lpec, point.w
+        better = self._point(w + step.d, step.zero, None, False)
+        radius = self._tolerances.radius
+        sets = active_sets(*self._sides(w), self._tolerances.biactive)
+        for _ in range(SHRINKS):
+            if better is not None and better.f <= enough:
+                return better
+            radius *= SHRINK
+            step = self._steps.lpec(w, sets, radius, point.equal)
+            if not step.solved or step.value == 0.0:
+                return None
+            reach = radius * np.maximum(1.0, np.abs(w))
+            better = self._certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=EARLY)
+        return better if better is not None and better.f <= enough else None
+
+    def _sides(self, w):
+        at = self._c.evaluate(w)
+        return at.G, at.H
 
     def _keep(self, point):
         """Keep the better of the incumbent and ``point``: certified before uncertified, then the lower objective."""
@@ -181,114 +184,40 @@ class HybridSolver:
         if best is None or (not point.certificate.certified, point.f) < (not best.certificate.certified, best.f):
             self.run.point = point
 
-    def _point(self, w, zero):
+    def _point(self, w, zero, duals, final):
         """The solution of branch ``zero``, certified; None if it has none.
 
-        A branch that was solved is not solved again; one that failed gets more tries, from better points.
+        A branch that was solved is not solved again; one that failed gets more tries, from better points, with and without
+        multipliers in turn.
         """
         key = zero.tobytes()
         if self._tried[key] >= TRIES:
             return None
         self._tried[key] += 1
-        solved, equal = self._solve_branch(w, zero)
+        patient = final or self._tried[key] == TRIES
+        point = self._certified(w, zero, duals=duals if self._tried[key] != 2 else None, max_iter=None if patient else EARLY)
+        if point is None and final and duals is not None:
+            point = self._certified(w, zero, duals=None)
+        if point is not None and point.certificate.grade is not Stationarity.DESCENT:
+            self._tried[key] = TRIES
+        return point
+
+    def _certified(self, w, zero, duals=None, **more):
+        solved, equal = self._solve_branch(w, zero, duals, **more)
         if solved is None:
             return None
-        certificate = self._certify(solved.w, equal)
+        certificate = self._steps.certify(solved, equal)
         if not certificate.feasible:
             return None
-        self._tried[key] = TRIES
         if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
-            raise _Stop(Outcome.UNBOUNDED)
-        return Point(solved, self._c.evaluate(solved.w).f, certificate)
+            raise Stop(Outcome.UNBOUNDED)
+        return Point(solved, self._c.evaluate(solved.w).f, certificate, equal)
 
-    def _solve_branch(self, w, zero):
+    def _solve_branch(self, w, zero, duals, **more):
         """Two stages where pairs are to be decided (eq. 13): with the penalty to read eta, then with what eta decides."""
         c = self._c
-        decided = c.eta.numel()
-        first = self._branch_nlp(w, zero, None, weight=1.0)
-        if first is None or not decided:
+        first = self._steps.branch(w, zero, None, 1.0, duals=duals, **more)
+        if first is None or not c.eta.numel():
             return first, None
         equal = c.evaluate(first.w).eta > self._tolerances.eta
-        second = self._branch_nlp(first.w, zero, equal, weight=0.0)
-        return second, equal
-
-    # single steps, timed, counted and shown
-
-    def _relax(self, form, w, eps):
-        if form not in self._relaxations:
-            options = self._options
-            budget = {'max_iter': options.relaxation_iterations, 'tol': options.relaxation_tol}
-            with self._timed('build'):
-                self._relaxations[form] = RELAXATIONS[form](
-                    self._c, self._sides, budget | options.nlp_options.value(), self._deadline
-                )
-        return self._nlp('relaxation', eps, lambda: self._relaxations[form].solve(w, eps))
-
-    def _branch_nlp(self, w, zero, equal, weight):
-        result = self._nlp('branch', 0.0, lambda: self._branch.solve(w, zero, equal, weight))
-        return result if result is not None and self._usable(result) else None
-
-    def _nlp(self, kind, eps, solve):
-        with self._timed(kind) as started:
-            result = solve()
-        if result is not None:
-            self.run.counts.nlps += 1
-            self.run.counts.iterations += result.iterations
-            self._log(kind, eps, result.w, result.iterations, result.status, started)
-        return result
-
-    def _lpec_step(self, w, sets):
-        with self._timed('lpec') as started:
-            result = self._lpec.solve(w, sets, self._tolerances.radius)
-        self._count_lpec(result)
-        self._log('lpec', 0.0, w, 0, f'{result.value:.1e}', started)
-        return result
-
-    def _certify(self, w, equal):
-        with self._timed('lpec') as started:
-            certificate = certify(self._c, self._lpec, w, self._tolerances, equal)
-        if certificate.lpec is not None:
-            self._count_lpec(certificate.lpec)
-        self._log('certificate', 0.0, w, 0, certificate.grade.name, started)
-        return certificate
-
-    @contextmanager
-    def _timed(self, kind):
-        """Check the limits, then time what follows; gives the time at which it began."""
-        self._check_limits()
-        self._timer.start(kind)
-        try:
-            yield time.perf_counter()
-        finally:
-            self._timer.stop(kind)
-
-    def _count_lpec(self, result):
-        self.run.counts.lpecs += 1
-        self.run.counts.binaries = max(self.run.counts.binaries, result.binaries)
-
-    def _check_limits(self):
-        if self._deadline is not None and time.perf_counter() > self._deadline:
-            raise _Stop(Outcome.TIME_LIMIT)
-        if self.run.counts.iterations >= self._options.max_iterations:
-            raise _Stop(Outcome.ITERATION_LIMIT)
-
-    def _log(self, kind, eps, w, iterations, status, started):
-        c = self._c
-        at = c.evaluate(w)
-        low = np.minimum(at.G, at.H)
-        violation = max(self._violation(w), -low.min(initial=0.0))
-        biactive = int(np.count_nonzero(np.maximum(at.G, at.H) <= self._biactive(at)))
-        step = Step(
-            kind,
-            eps,
-            c.sign * at.f,
-            float(violation),
-            float(np.abs(low).max(initial=0.0)),
-            biactive,
-            iterations,
-            status,
-            time.perf_counter() - started,
-            w,
-        )
-        self.run.steps.append(step)
-        self._show(step)
+        return self._steps.branch(first.w, zero, equal, 0.0, duals=first, **more), equal

@@ -1,4 +1,4 @@
-"""The reduced LPEC: the MPCC linearised at a point, binaries only for bi-active pairs, solved by HiGHS (theory, eq. 17).
+"""The reduced LPEC: the MPCC linearised at a point, binaries only for bi-active pairs (theory, eq. 17).
 
     min  grad f' d
     s.t. linearised rows and bounds,   |d_j| <= Delta max(1, |w_j|)
@@ -7,6 +7,9 @@
 
 with M_i from the row's 1-norm over the trust region, never a global big-M.  d = 0 is feasible by construction: what the point
 already violates is not asked of d.
+
+Where multipliers are at hand, weak duality is asked first: if it shows that even without the binaries nothing descends, no
+branch does, and HiGHS is not called.
 """
 
 import time
@@ -17,9 +20,21 @@ import numpy as np
 from scipy import sparse
 
 from pyomo_fesd.mpcc.active_set import G_ZERO, H_ZERO
+from pyomo_fesd.mpcc.duality import lower_bound
 
-#: Tighter than HiGHS' own 1e-7: a step's value is compared with 1e-6.
-FEASIBILITY = 1e-9
+#: HiGHS' own 1e-7 is too coarse: a step's value is compared with 1e-6.  Its presolve calls some LPECs infeasible although d = 0
+#: is feasible, so nothing of that kind is believed before the other settings had their turn.
+ATTEMPTS = (
+    {'presolve': 'choose', 'tolerance': 1e-9},
+    {'presolve': 'off', 'tolerance': 1e-9},
+    {'presolve': 'off', 'tolerance': 1e-8, 'solver': 'ipm'},
+    {'presolve': 'choose', 'tolerance': 1e-7},
+)
+TOLERANCES = ('primal_feasibility_tolerance', 'dual_feasibility_tolerance', 'mip_feasibility_tolerance')
+ENDED_WELL = (highspy.HighsModelStatus.kOptimal, highspy.HighsModelStatus.kObjectiveTarget)
+LIMITED = (highspy.HighsModelStatus.kSolutionLimit, highspy.HighsModelStatus.kIterationLimit, highspy.HighsModelStatus.kTimeLimit)
+#: Branch and bound ends at a direction whose value is below this many times what counts as descent.
+CLEAR_DESCENT = 1e3
 
 
 @dataclass(frozen=True)
@@ -30,7 +45,7 @@ class LpecResult:
     ----------
     solved : bool
     value : float
-        grad f' d, never positive
+        grad f' d (from weak duality: a lower bound of it), never positive
     d : array (n)
     zero : int array (q)
         the assignment that d follows
@@ -44,33 +59,66 @@ class LpecResult:
     binaries: int
 
 
+@dataclass(frozen=True)
+class _Program:
+    """min cost' d, low <= A d <= high, lower <= d <= upper; the rows of bi-active pairs stand last but one group each."""
+
+    cost: np.ndarray
+    A: object
+    low: np.ndarray
+    high: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    sides: tuple
+
+
 class Lpec:
     """Solves LPECs of one compiled MPCC.
 
     Parameters
     ----------
+    sides : Sides
     options : dict
         HiGHS options, passed through
     deadline : float or None
         value of ``time.perf_counter()`` at which HiGHS is to stop
     """
 
-    def __init__(self, compiled, options, deadline=None):
-        self._c, self._options, self._deadline = compiled, options, deadline
+    def __init__(self, compiled, sides, options, deadline=None):
+        self._c, self._sides, self._options, self._deadline = compiled, sides, options, deadline
 
-    def solve(self, w, sets, Delta, equal=None, beyond=False):
+    def solve(self, w, sets, Delta, equal=None, beyond=False, multipliers=None, small=None, limits=None):
         """Solve the LPEC at ``w`` with active sets ``sets``, trust region ``Delta`` and the decisions ``equal`` imposed.
 
-        With ``beyond`` the artificial bounds do not count: is there descent that only they forbid?
+        Parameters
+        ----------
+        beyond : bool
+            the artificial bounds do not count: is there descent that only they forbid?
+        multipliers : array, optional
+            of the branch's rows, positive at lower bounds, to try weak duality with
+        small : float, optional
+            descent below this is none: weak duality may end the search, and a clear descent may end branch and bound
+        limits : dict, optional
+            HiGHS options of this call; when one of them ends the search, the best direction so far is taken
         """
+        equal = np.zeros(self._c.equal.numel(), dtype=bool) if equal is None else equal
+        program = self._program(w, sets, Delta, equal, beyond)
+        if multipliers is not None and small is not None:
+            y = self._row_multipliers(multipliers, sets, equal)
+            bound = lower_bound(program.cost, program.A, program.low, program.high, program.lower, program.upper, y)
+            if bound >= -small:
+                return LpecResult(True, min(bound, 0.0), np.zeros(len(w)), sets.zero, 0)
+        return self._mixed_integer(w, sets, program, small, limits or {})
+
+    def _program(self, w, sets, Delta, equal, beyond):
+        """The linear program without the binaries."""
         c = self._c
         free = c.artificial & beyond
         lbx, ubx = np.where(free, -np.inf, c.lbx), np.where(free, np.inf, c.ubx)
         at = c.evaluate(w)
         grad, J_g, J_G, J_H, J_equal = c.gradients(w)
-        d_low, d_high = _box(w, lbx, ubx, Delta)
-        gamma = np.flatnonzero(sets.gamma)
-        equal = np.zeros(J_equal.shape[0], dtype=bool) if equal is None else equal
+        lower, upper = _box(w, lbx, ubx, Delta)
+        self._fix(lower, upper, sets)
         G, H = np.maximum(at.G, 0.0), np.maximum(at.H, 0.0)
         rows = [
             (J_g, np.minimum(c.lbg - at.g, 0.0), np.maximum(c.ubg - at.g, 0.0)),
@@ -78,66 +126,90 @@ class Lpec:
             (J_H[sets.alpha], -H[sets.alpha], np.inf),
             (J_H[sets.beta], 0.0, 0.0),
             (J_G[sets.beta], -G[sets.beta], np.inf),
-            (J_G[gamma], -G[gamma], np.inf),
-            (J_H[gamma], -H[gamma], np.inf),
             (J_equal[equal], 0.0, 0.0),
+            (J_G[sets.gamma], -G[sets.gamma], np.inf),
+            (J_H[sets.gamma], -H[sets.gamma], np.inf),
         ]
-        A = sparse.vstack([r[0] for r in rows])
+        A = sparse.vstack([r[0] for r in rows]).tocsr()
         low = np.concatenate([np.broadcast_to(r[1], r[0].shape[0]) for r in rows])
         high = np.concatenate([np.broadcast_to(r[2], r[0].shape[0]) for r in rows])
-        # G + grad G d - M y <= 0  and  H + grad H d + M y <= M
-        M_G, M_H = (_big_m(J[gamma], S[gamma], d_low, d_high) for J, S in ((J_G, G), (J_H, H)))
-        y = len(gamma)
-        switch = sparse.bmat([[J_G[gamma], -sparse.diags(M_G)], [J_H[gamma], sparse.diags(M_H)]]) if y else None
-        A = sparse.hstack([A, sparse.csr_matrix((A.shape[0], y))])
+        gamma = sets.gamma
+        return _Program(grad, A, low, high, lower, upper, ((J_G[gamma], G[gamma]), (J_H[gamma], H[gamma])))
+
+    def _fix(self, lower, upper, sets):
+        """A side that is zero where its variables stand at their bounds stays zero only if none of them moves."""
+        settled = np.concatenate([sets.alpha, sets.beta]) & (self._sides.row_of < 0)
+        still = self._sides.fixings[np.flatnonzero(settled)].indices
+        lower[still] = upper[still] = 0.0
+
+    def _row_multipliers(self, lam, sets, equal):
+        """Multipliers of a branch's rows (own, sides, decisions) in the order of the program's rows."""
+        m, q, row_of = len(self._c.lbg), len(sets.zero), self._sides.row_of
+        of_side = np.zeros(2 * q)
+        of_side[row_of >= 0] = lam[m + row_of[row_of >= 0]]
+        G, H = of_side[:q], of_side[q:]
+        decided = lam[len(lam) - len(equal) :]
+        alpha, beta, gamma = sets.alpha, sets.beta, sets.gamma
+        return np.concatenate([lam[:m], G[alpha], H[alpha], H[beta], G[beta], decided[equal], G[gamma], H[gamma]])
+
+    def _mixed_integer(self, w, sets, p, small, limits):
+        """With a binary for each bi-active pair: G + grad G d - M y <= 0  and  H + grad H d + M y <= M."""
+        n, y = len(w), int(sets.gamma.sum())
+        A, high = p.A, p.high
         if y:
-            A = sparse.vstack([A, switch])
-            low = np.concatenate([low, np.full(2 * y, -np.inf)])
-            high = np.concatenate([high, -G[gamma], M_H - H[gamma]])
-        start = np.concatenate([np.zeros(len(w)), (sets.zero[gamma] == H_ZERO).astype(float)])
-        solution = self._highs(
-            np.concatenate([grad, np.zeros(y)]),
+            (J_G, G), (J_H, H) = p.sides
+            M_G, M_H = _big_m(J_G, G, p.lower, p.upper), _big_m(J_H, H, p.lower, p.upper)
+            switch = sparse.bmat([[J_G, -sparse.diags(M_G)], [J_H, sparse.diags(M_H)]])
+            A = sparse.vstack([sparse.hstack([A, sparse.csr_matrix((A.shape[0], y))]), switch])
+            high = np.concatenate([high, -G, M_H - H])
+        program = _Program(
+            np.concatenate([p.cost, np.zeros(y)]),
             A.tocsc(),
-            low,
+            np.concatenate([p.low, np.full(2 * y, -np.inf)]),
             high,
-            np.concatenate([d_low, np.zeros(y)]),
-            np.concatenate([d_high, np.ones(y)]),
-            y,
-            start,
+            np.concatenate([p.lower, np.zeros(y)]),
+            np.concatenate([p.upper, np.ones(y)]),
+            (),
         )
+        start = np.concatenate([np.zeros(n), (sets.zero[sets.gamma] == H_ZERO).astype(float)])
+        solution = self._highs(program, y, start, None if small is None else -CLEAR_DESCENT * small, limits)
         zero = sets.zero.copy()
         if solution is None:
-            return LpecResult(False, 0.0, np.zeros(len(w)), zero, y)
-        zero[gamma] = np.where(solution[len(w) :] > 0.5, H_ZERO, G_ZERO)
-        d = solution[: len(w)]
-        return LpecResult(True, min(float(grad @ d), 0.0), d, zero, y)
+            return LpecResult(False, 0.0, np.zeros(n), zero, y)
+        zero[sets.gamma] = np.where(solution[n:] > 0.5, H_ZERO, G_ZERO)
+        return LpecResult(True, min(float(p.cost @ solution[:n]), 0.0), solution[:n], zero, y)
 
-    def _highs(self, cost, A, low, high, lower, upper, binaries, start):
-        """Solve with HiGHS; the feasible d = 0 is handed over, and no 'infeasible' is believed before presolve is off."""
+    def _highs(self, p, binaries, start, target, limits):
+        """Solve with HiGHS, from a start that is feasible; None if it does not end well."""
         lp = highspy.HighsLp()
-        lp.num_col_, lp.num_row_ = A.shape[1], A.shape[0]
-        lp.col_cost_, lp.col_lower_, lp.col_upper_ = cost, lower, upper
-        lp.row_lower_, lp.row_upper_ = low, high
+        lp.num_col_, lp.num_row_ = p.A.shape[1], p.A.shape[0]
+        lp.col_cost_, lp.col_lower_, lp.col_upper_ = p.cost, p.lower, p.upper
+        lp.row_lower_, lp.row_upper_ = p.low, p.high
         lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-        lp.a_matrix_.start_, lp.a_matrix_.index_, lp.a_matrix_.value_ = A.indptr, A.indices, A.data
+        lp.a_matrix_.start_, lp.a_matrix_.index_, lp.a_matrix_.value_ = p.A.indptr, p.A.indices, p.A.data
         if binaries:
-            kinds = [highspy.HighsVarType.kContinuous] * (A.shape[1] - binaries)
+            kinds = [highspy.HighsVarType.kContinuous] * (p.A.shape[1] - binaries)
             lp.integrality_ = kinds + [highspy.HighsVarType.kInteger] * binaries
-        for presolve in ('choose', 'off'):
+        for attempt in ATTEMPTS:
             highs = highspy.Highs()
             highs.setOptionValue('output_flag', False)
-            for name in ('primal_feasibility_tolerance', 'dual_feasibility_tolerance', 'mip_feasibility_tolerance'):
-                highs.setOptionValue(name, FEASIBILITY)
+            settings = {name: value for name, value in attempt.items() if name != 'tolerance'}
+            if binaries:
+                settings.pop('solver', None)
+                if target is not None:
+                    settings['objective_target'] = target
             if self._deadline is not None:
-                highs.setOptionValue('time_limit', max(0.0, self._deadline - time.perf_counter()))
-            for name, option in (self._options | {'presolve': presolve}).items():
+                settings['time_limit'] = max(0.0, self._deadline - time.perf_counter())
+            settings |= dict.fromkeys(TOLERANCES, attempt['tolerance']) | limits | self._options
+            for name, option in settings.items():
                 highs.setOptionValue(name, option)
             highs.passModel(lp)
             guess = highspy.HighsSolution()
             guess.col_value = list(start)
             highs.setSolution(guess)
             highs.run()
-            if highs.getModelStatus() == highspy.HighsModelStatus.kOptimal:
+            status = highs.getModelStatus()
+            if status in ENDED_WELL or (limits and status in LIMITED and highs.getSolution().value_valid):
                 return np.array(highs.getSolution().col_value)
         return None
 

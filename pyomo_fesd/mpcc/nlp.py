@@ -6,7 +6,7 @@ import signal
 import threading
 import time
 from contextlib import contextmanager, redirect_stderr
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -21,9 +21,16 @@ IPOPT = {
     'least_square_init_duals': 'yes',
     # MUMPS' own permutation for scaling takes most of the time on these systems and gains nothing
     'mumps_permuting_scaling': 0,
+    # dependent constraints are the rule here: G = 0 and H = 0 both follow where a pair is bi-active
+    'perturb_always_cd': 'yes',
     'print_level': 0,
     'sb': 'yes',
 }
+#: For a start with multipliers: neither they nor the point are pushed far from their bounds.
+WARM_DUALS = {'warm_start_init_point': 'yes'} | {
+    f'warm_start_{name}': 1e-6 for name in ('bound_push', 'bound_frac', 'slack_bound_push', 'slack_bound_frac', 'mult_bound_push')
+}
+NOT_BEGUN = ('Not_Enough_Degrees_Of_Freedom', 'Invalid_Problem_Definition', 'Invalid_Option')
 SOLVED = ('Solve_Succeeded', 'Solved_To_Acceptable_Level', 'Feasible_Point_Found')
 
 
@@ -42,6 +49,14 @@ class NlpResult:
     def solved(self):
         """Whether Ipopt reports a stationary, feasible point."""
         return self.status in SOLVED
+
+    def shortened(self, n):
+        """The same result with the first ``n`` variables' values."""
+        return replace(self, w=self.w[:n])
+
+    def with_multipliers(self, lam_x, lam_g):
+        """The same result with other multipliers, to start another NLP from."""
+        return replace(self, lam_x=lam_x, lam_g=lam_g)
 
 
 @contextmanager
@@ -65,13 +80,13 @@ def _interruptible():
         raise KeyboardInterrupt
 
 
-class _Deadline(ca.Callback):
-    """Asks Ipopt to stop when the time is up."""
+class _Watch(ca.Callback):
+    """Asks Ipopt to stop when the time is up or the iterations that this call may use are spent."""
 
     def __init__(self, n, m, p, until):
         super().__init__()
-        self._sizes, self._until = (n, m, p), until
-        self.construct('deadline', {})
+        self._sizes, self._until, self.left = (n, m, p), until, None
+        self.construct('watch', {})
 
     def get_n_in(self):
         return ca.nlpsol_n_out()
@@ -85,7 +100,11 @@ class _Deadline(ca.Callback):
         return ca.Sparsity.dense(length, 1)
 
     def eval(self, arg):
-        return [float(time.perf_counter() > self._until)]
+        if self.left is not None:
+            self.left -= 1
+            if self.left < 0:
+                return [1.0]
+        return [float(self._until is not None and time.perf_counter() > self._until)]
 
 
 class Nlp:
@@ -103,21 +122,50 @@ class Nlp:
     """
 
     def __init__(self, name, x, p, f, g, options, deadline=None, jacobian=None):
-        settings = {'print_time': False, 'ipopt': IPOPT | options}
+        self._watch = _Watch(x.numel(), g.numel(), p.numel(), deadline)
+        self._settings = {'print_time': False, 'ipopt': IPOPT | options, 'iteration_callback': self._watch}
         if jacobian is not None:
-            settings['jac_g'] = ca.Function('nlp_jac_g', [x, p], [g, jacobian], ['x', 'p'], ['g', 'jac_g_x'])
-        if deadline is not None:
-            self._deadline = _Deadline(x.numel(), g.numel(), p.numel(), deadline)
-            settings['iteration_callback'] = self._deadline
-        self._solver = ca.nlpsol(name, 'ipopt', {'x': x, 'p': p, 'f': f, 'g': g}, settings)
+            self._settings['jac_g'] = ca.Function('nlp_jac_g', [x, p], [g, jacobian], ['x', 'p'], ['g', 'jac_g_x'])
+        self._problem = {'x': x, 'p': p, 'f': f, 'g': g}
+        self._name = name
+        self._cold, self._warm = ca.nlpsol(name, 'ipopt', self._problem, self._settings), None
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg):
-        """Solve from ``w0``; never raises for an unsolved problem, the status says it."""
+    def _solver(self, duals):
+        """The solver for a start without or with multipliers; both use the same derivatives."""
+        if duals is None:
+            return self._cold
+        if self._warm is None:
+            derivatives = {
+                option: self._cold.get_function(name)
+                for option, name in (('grad_f', 'nlp_grad_f'), ('jac_g', 'nlp_jac_g'), ('hess_lag', 'nlp_hess_l'))
+            }
+            settings = self._settings | derivatives | {'ipopt': WARM_DUALS | self._settings['ipopt']}
+            self._warm = ca.nlpsol(self._name, 'ipopt', self._problem, settings)
+        return self._warm
+
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
+        """Solve from ``w0``; never raises for an unsolved problem, the status says it.
+
+        Parameters
+        ----------
+        duals : NlpResult, optional
+            multipliers to start from
+        max_iter : int, optional
+            iterations that this call may use
+        """
+        solver = self._solver(duals)
+        self._watch.left = max_iter
+        start = {} if duals is None else {'lam_x0': duals.lam_x, 'lam_g0': duals.lam_g}
         said = io.StringIO()
         with redirect_stderr(said), _interruptible():
-            result = self._solver(x0=w0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
+            result = solver(x0=w0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg, **start)
         if said.getvalue():
             logger.debug("casadi: %s", said.getvalue())
-        stats = self._solver.stats()
+        stats = solver.stats()
         w, lam_g, lam_x = (np.asarray(result[key], dtype=float).ravel() for key in ('x', 'lam_g', 'lam_x'))
-        return NlpResult(w, float(result['f']), stats['return_status'], int(stats['iter_count']), lam_g, lam_x)
+        return NlpResult(w, float(result['f']), stats['return_status'], _iterations(stats), lam_g, lam_x)
+
+
+def _iterations(stats):
+    """Ipopt leaves its counter unset when it does not begin."""
+    return int(stats['iter_count']) if stats['return_status'] not in NOT_BEGUN else 0

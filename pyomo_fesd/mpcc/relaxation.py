@@ -1,10 +1,12 @@
-"""Reg(eps): the complementarity relaxed, in forms that differ in one row or term (theory, eq. 15).
+"""Reg(eps): the complementarity relaxed, in forms that differ in their rows or in one term (theory, eq. 15).
 
 Takes: a compiled MPCC and its sorted sides.
-Leaves: an NLP built once, in which only a bound or a parameter changes with eps.  Decided pairs (eq. 13) are left to the penalty.
+Leaves: an NLP built once, in which only the parameter eps changes.  eps means the same in every form with rows: the largest
+product that two equal sides can have, so a form in t (Lin-Fukushima, Kanzow-Schwartz, ...) has t = sqrt(eps).  Decided pairs
+(eq. 13) are left to the penalty.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
@@ -12,55 +14,131 @@ import numpy as np
 from pyomo_fesd.mpcc.nlp import Nlp
 
 
-class _Relaxation:
-    """What the forms share: rows and bounds of the model and the signs of the sides that bounds do not imply."""
+@dataclass
+class Terms:
+    """What a form adds: ``rows`` <= 0 (== 0 if ``equal``), ``cost`` to the objective, and perhaps one slack for all pairs."""
 
-    def __init__(self, c, sides, options, deadline):
-        self._c = c
-        self._lbg = np.concatenate([c.lbg, np.zeros(sides.rows.numel()), np.full(c.G.numel(), -np.inf)])
-        self._ubg = np.concatenate([c.ubg, np.full(sides.rows.numel(), np.inf), np.zeros(c.G.numel())])
-        self._build(c, ca.vertcat(c.g, sides.rows), options, deadline)
-
-
-class Scholtes(_Relaxation):
-    """min f  s.t.  G, H >= 0,  G_i H_i <= eps."""
-
-    def _build(self, c, rows, options, deadline):
-        self._nlp = Nlp('scholtes', c.x, ca.SX(0, 1), c.f + c.penalty, ca.vertcat(rows, c.G * c.H), options, deadline)
-
-    def solve(self, w, eps):
-        """Solve from ``w``; eps is the upper bound of the product rows."""
-        self._ubg[len(self._ubg) - self._c.G.numel() :] = eps
-        return self._nlp.solve(w, [], self._c.lbx, self._c.guide_ubx, self._lbg, self._ubg)
+    rows: object = field(default_factory=lambda: ca.SX(0, 1))
+    equal: bool = False
+    cost: object = 0
+    slack: object = None
 
 
-class Elastic(_Relaxation):
-    """min f + s/eps  s.t.  G, H >= 0,  G_i H_i <= s,  s >= 0: one slack for all pairs (l-infinity elastic mode).
+def scholtes(G, H, eps):
+    """G H <= eps.  Source: Scholtes, SIAM J. Optim. 11 (2001) 918."""
+    return Terms(G * H - eps)
 
-    On simulations with finite elements it needs far fewer iterations than ``Scholtes``.
+
+def scholtes_equality(G, H, eps):
+    """G H = eps: the central path of the pairs, without an interior.  Source: Facchinei, Jiang, Qi, Math. Program. 85 (1999)."""
+    return Terms(G * H - eps, equal=True)
+
+
+def lin_fukushima(G, H, eps):
+    """G H <= t^2 and (G + t)(H + t) >= t^2, t^2 = eps.  Source: Lin, Fukushima, Ann. Oper. Res. 133 (2005) 63."""
+    t = ca.sqrt(eps)
+    return Terms(ca.vertcat(G * H - eps, eps - (G + t) * (H + t)))
+
+
+def kanzow_schwartz(G, H, eps):
+    """phi(G - t, H - t) <= 0, phi(a, b) = a b if a + b >= 0, else -(a^2 + b^2)/2: an L with its corner at (t, t).
+
+    Source: Kanzow, Schwartz, SIAM J. Optim. 23 (2013) 770.
+    """
+    a, b = G - ca.sqrt(eps), H - ca.sqrt(eps)
+    return Terms(ca.if_else(a + b >= 0, a * b, -(a**2 + b**2) / 2))
+
+
+def steffensen_ulbrich(G, H, eps):
+    """G + H <= phi(G - H), phi(z) = |z| for |z| >= t, rounded within: relaxed near the corner only, exact elsewhere.
+
+    phi(z) = t theta(z/t), theta(r) = 1 + (2/pi) sin(pi (r + 3)/2).  Source: Steffensen, Ulbrich, SIAM J. Optim. 20 (2010) 2504.
+    """
+    t = 2 * ca.sqrt(eps) / (1 - 2 / np.pi)
+    z = G - H
+    rounded = t * (1 + (2 / np.pi) * ca.sin(np.pi * (z / t + 3) / 2))
+    return Terms(G + H - ca.if_else(ca.fabs(z) >= t, ca.fabs(z), rounded))
+
+
+def fischer_burmeister(G, H, eps):
+    """G + H = sqrt(G^2 + H^2 + 2 eps), that is G H = eps with G + H > 0.  Source: Kanzow, SIAM J. Matrix Anal. 17 (1996) 851."""
+    return Terms(G + H - ca.sqrt(G**2 + H**2 + 2 * eps), equal=True)
+
+
+def l1(G, H, eps):
+    """min f + sum_i G_i H_i / eps (l1 elastic mode).  Source: Ralph, Wright, Optim. Methods Softw. 19 (2004) 527."""
+    return Terms(cost=ca.dot(G, H) / eps)
+
+
+def elastic(G, H, eps):
+    """min f + s/eps, G_i H_i <= s, s >= 0: one slack for all pairs (l-infinity elastic mode).
+
+    Source: Anitescu, SIAM J. Optim. 15 (2005) 1203.
+    """
+    s = ca.SX.sym('s')
+    return Terms(G * H - s, cost=s / eps, slack=s)
+
+
+#: First value of the slack: 1, or just above what the start violates once that is less.
+ROOM = 1e-2
+
+
+class Relaxation:
+    """One form for one MPCC."""
+
+    def __init__(self, c, sides, form, options, deadline):
+        eps = ca.SX.sym('eps')
+        terms = form(c.G, c.H, eps)
+        self._c, self._slack = c, int(terms.slack is not None)
+        rows = ca.vertcat(c.g, sides.rows, terms.rows)
+        signs, count = sides.rows.numel(), terms.rows.numel()
+        self._lbg = np.concatenate([c.lbg, np.zeros(signs), np.full(count, 0.0 if terms.equal else -np.inf)])
+        self._ubg = np.concatenate([c.ubg, np.full(signs, np.inf), np.zeros(count)])
+        w, jacobian = c.x, None
+        if self._slack:
+            # the slack's column is dense, which would defeat casadi's colouring
+            w = ca.vertcat(c.x, terms.slack)
+            jacobian = ca.horzcat(ca.jacobian(rows, c.x), ca.jacobian(rows, terms.slack))
+        self._nlp = Nlp(form.__name__, w, ca.vertcat(eps, c.p), c.f + c.penalty + terms.cost, rows, options, deadline, jacobian=jacobian)
+
+    def solve(self, w, eps, duals=None):
+        """Solve from ``w``, with the multipliers of an earlier result of this form if given."""
+        c = self._c
+        lbx, ubx = c.lbx, c.guide_ubx
+        if self._slack:
+            at = c.evaluate(w)
+            w = np.append(w, min(1.0, (at.G * at.H).max(initial=0.0) + ROOM))
+            lbx, ubx = np.append(lbx, 0.0), np.append(ubx, np.inf)
+        result = self._nlp.solve(w, [eps, *c.parameters], lbx, ubx, self._lbg, self._ubg, duals)
+        return result.shortened(len(c.x0))
+
+
+class Penalty(Relaxation):
+    """min f + rho sum_i G_i H_i with a weight that grows only as long as a product is above eps (paper, eq. 16).
+
+    Source: Leyffer, Lopez-Calva, Nocedal, SIAM J. Optim. 17 (2006) 52.
     """
 
-    #: First value of s: 1, or just above what the start violates once that is less.
-    ROOM = 1e-2
+    #: rho at the start and its growth.
+    START, GROWTH, LIMIT = 1.0, 10.0, 1e12
 
-    def _build(self, c, rows, options, deadline):
-        s, weight = ca.SX.sym('s'), ca.SX.sym('weight')
-        f = c.f + c.penalty + weight * s
-        products = c.G * c.H
-        by_x = ca.jacobian(ca.vertcat(rows, products), c.x)
-        by_s = ca.vertcat(ca.SX(rows.numel(), 1), -ca.SX.ones(products.numel(), 1))
-        w, g = ca.vertcat(c.x, s), ca.vertcat(rows, products - s)
-        self._nlp = Nlp('elastic', w, weight, f, g, options, deadline, jacobian=ca.horzcat(by_x, by_s))
+    def __init__(self, c, sides, form, options, deadline):
+        super().__init__(c, sides, form, options, deadline)
+        self._rho = self.START
 
-    def solve(self, w, eps):
-        """Solve from ``w``; 1/eps is the weight of s."""
-        c = self._c
-        at = c.evaluate(w)
-        s = min(1.0, (at.G * at.H).max(initial=0.0) + self.ROOM)
-        lbx, ubx = np.append(c.lbx, 0.0), np.append(c.guide_ubx, np.inf)
-        result = self._nlp.solve(np.append(w, s), [1 / eps], lbx, ubx, self._lbg, self._ubg)
-        return replace(result, w=result.w[:-1])
+    def solve(self, w, eps, duals=None):
+        """Solve from ``w`` with the weight that brings every product to ``eps``."""
+        spent = 0
+        while True:
+            result = super().solve(w, 1 / self._rho, duals)
+            spent += result.iterations
+            at = self._c.evaluate(result.w)
+            if not result.solved or (at.G * at.H).max(initial=0.0) <= eps or self._rho >= self.LIMIT:
+                return replace(result, iterations=spent)
+            self._rho *= self.GROWTH
+            w, duals = result.w, result
 
 
-#: option ``relaxation`` -> form
-RELAXATIONS = {'elastic': Elastic, 'scholtes': Scholtes}
+#: option ``relaxation`` -> how it is built from a compiled MPCC, its sides, Ipopt's options and a deadline
+FORMS = (scholtes, scholtes_equality, lin_fukushima, kanzow_schwartz, steffensen_ulbrich, fischer_burmeister, l1, elastic)
+RELAXATIONS = {form.__name__: (Relaxation, form) for form in FORMS} | {'penalty': (Penalty, l1)}

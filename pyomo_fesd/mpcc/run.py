@@ -19,6 +19,13 @@ class Outcome(Enum):
     INTERRUPTED = "interrupted"
 
 
+class Stop(Exception):
+    """A limit was reached; carries the outcome."""
+
+    def __init__(self, outcome):
+        self.outcome = outcome
+
+
 @dataclass(frozen=True)
 class Tolerances:
     """Tolerances of the algorithm; see the options of ``mpec_hybrid`` for their meaning."""
@@ -63,6 +70,7 @@ class Point:
     nlp: object
     f: float
     certificate: object
+    equal: object = None
 
     @property
     def w(self):

@@ -45,7 +45,7 @@ def sort_sides(c):
     """Sort the sides of a compiled MPCC."""
     S = ca.vertcat(c.G, c.H)
     if S.numel() == 0:
-        return Sides(ca.SX(0, 1), np.zeros(0, dtype=int), sparse.csr_matrix((0, len(c.variables))))
+        return Sides(ca.SX(0, 1), np.zeros(0, dtype=int), sparse.csr_matrix((0, len(c.x0))))
     nonlinear = np.array(ca.which_depends(S, c.x, 2, True))
     _, _, J_G, J_H, _ = c.gradients(c.x0)
     at = c.evaluate(c.x0)

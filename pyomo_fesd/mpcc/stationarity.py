@@ -64,7 +64,7 @@ class Certificate:
         return self.grade is not Stationarity.INFEASIBLE
 
 
-def certify(c, lpec, w, tolerances, equal=None):
+def certify(c, lpec, w, tolerances, equal=None, multipliers=None):
     """Judge the point ``w`` of a compiled MPCC.
 
     Parameters
@@ -73,6 +73,8 @@ def certify(c, lpec, w, tolerances, equal=None):
     tolerances : Tolerances
     equal : bool array or None
         decisions in force at ``w``; None reads them from eta
+    multipliers : array or None
+        of the branch NLP's rows (positive at lower bounds), which may spare the LPEC
 
     Returns
     -------
@@ -84,11 +86,13 @@ def certify(c, lpec, w, tolerances, equal=None):
     low = np.minimum(at.G, at.H)
     negative = max(bounds.max(initial=0.0), -low.min(initial=0.0))
     gap = np.abs(low)
-    violation = max(rows.max(initial=0.0), negative)
+    rows_abs, bounds_abs, sides_abs = c.absolute(rows, bounds, np.concatenate([at.G, at.H]))
+    low_abs = sides_abs.reshape(2, -1).min(axis=0)
+    violation = max(rows_abs.max(initial=0.0), bounds_abs.max(initial=0.0), -low_abs.min(initial=0.0))
     scaled = max(np.max(rows / _scale(J_g), initial=0.0), negative)
     gap_scaled = float(np.max(gap / np.minimum(_scale(J_G), _scale(J_H)), initial=0.0))
     sets = active_sets(at.G, at.H, tolerances.biactive)
-    measures = (int(sets.gamma.sum()), float(violation), float(gap.max(initial=0.0)), float(scaled), gap_scaled)
+    measures = (int(sets.gamma.sum()), float(violation), float(np.abs(low_abs).max(initial=0.0)), float(scaled), gap_scaled)
     if max(scaled, gap_scaled) > tolerances.feasibility:
         return Certificate(Stationarity.INFEASIBLE, 0.0, None, *measures)
     if not grad.any():
@@ -97,10 +101,10 @@ def certify(c, lpec, w, tolerances, equal=None):
     if equal is None:
         equal = at.eta > tolerances.eta
     small = tolerances.descent * max(1.0, abs(at.f))
-    result = lpec.solve(w, sets, tolerances.radius, equal, beyond=True)
+    result = lpec.solve(w, sets, tolerances.radius, equal, beyond=True, multipliers=multipliers, small=small)
     grade = Stationarity.B
     if result.solved and result.value < -small and c.artificial.any():
-        result, grade = lpec.solve(w, sets, tolerances.radius, equal), Stationarity.LIMITED
+        result, grade = lpec.solve(w, sets, tolerances.radius, equal, small=small), Stationarity.LIMITED
     if not result.solved:
         grade = Stationarity.UNSOLVED
     elif result.value < -small:
@@ -110,6 +114,6 @@ def certify(c, lpec, w, tolerances, equal=None):
 
 def _scale(J):
     """max(1, largest entry) of each row."""
-    if J.shape[0] == 0:
-        return np.ones(0)
+    if 0 in J.shape:
+        return np.ones(J.shape[0])
     return np.maximum(1.0, np.abs(J).max(axis=1).toarray().ravel())

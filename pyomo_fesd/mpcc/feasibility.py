@@ -1,0 +1,46 @@
+"""The feasibility phase: the least sum of violations of all rows and sides that Ipopt finds near a point.
+
+    min  1' (p + n)   s.t.  lb <= g(w) + p - n <= ub,  G_i(w) + p_i >= 0, H_i(w) + p_i >= 0,  G_i H_i - p_i <= eps,   p, n >= 0
+
+A stationary point with a positive sum is what 'locally infeasible' means; the rows and pairs with positive parts are the ones that
+contradict each other.
+
+Takes: a compiled MPCC and its sorted sides.
+Leaves: an NLP built when it is first needed.
+"""
+
+import casadi as ca
+import numpy as np
+
+from pyomo_fesd.mpcc.nlp import Nlp
+
+
+class Feasibility:
+    """The feasibility phase of one MPCC."""
+
+    def __init__(self, c, sides, options, deadline):
+        self._c = c
+        eps = ca.SX.sym('eps')
+        rows = ca.vertcat(c.g, sides.rows, c.G * c.H - eps)
+        lbg = np.concatenate([c.lbg, np.zeros(sides.rows.numel()), np.full(c.G.numel(), -np.inf)])
+        ubg = np.concatenate([c.ubg, np.full(sides.rows.numel(), np.inf), np.zeros(c.G.numel())])
+        up, down = np.flatnonzero(np.isfinite(lbg)), np.flatnonzero(np.isfinite(ubg))
+        p, n = ca.SX.sym('p', len(up)), ca.SX.sym('n', len(down))
+        rows[up.tolist()] += p
+        rows[down.tolist()] -= n
+        self._lbg, self._ubg, self._parts = lbg, ubg, len(up) + len(down)
+        self._up, self._down = up, down
+        self._rows = ca.Function('rows', [c.x, ca.vertcat(eps, c.p)], [ca.vertcat(c.g, sides.rows, c.G * c.H - eps)])
+        self._nlp = Nlp('feasibility', ca.vertcat(c.x, p, n), ca.vertcat(eps, c.p), ca.sum1(p) + ca.sum1(n), rows, options, deadline)
+
+    def solve(self, w, eps):
+        """Solve from ``w``; the result's ``f`` is the sum of violations that remains, its ``w`` the point."""
+        c = self._c
+        parameters = np.append(eps, c.parameters)
+        g = np.asarray(self._rows(w, parameters), dtype=float).ravel()
+        short, over = np.maximum(self._lbg - g, 0.0)[self._up], np.maximum(g - self._ubg, 0.0)[self._down]
+        start = np.concatenate([w, short, over])
+        lbx = np.concatenate([c.lbx, np.zeros(self._parts)])
+        ubx = np.concatenate([c.guide_ubx, np.full(self._parts, np.inf)])
+        result = self._nlp.solve(start, parameters, lbx, ubx, self._lbg, self._ubg)
+        return result.shortened(len(w))

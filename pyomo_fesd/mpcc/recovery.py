@@ -1,0 +1,41 @@
+"""What is tried after a relaxation has failed, in this order; every step shows in the log."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Size of a perturbation, relative to max(1, |w|), and its seed: a run can be repeated.
+SIZE, SEED = 1e-2, 1
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """One step of the ladder.
+
+    Attributes
+    ----------
+    what : str
+        as the log says it
+    start : callable (start of the run, last point, solver) -> array
+    eps : callable (first eps, last eps, factor) -> float
+    other_form : bool
+        whether the next form of Reg(eps) takes over
+    """
+
+    what: str
+    start: object
+    eps: object
+    other_form: bool = False
+
+
+def _perturbed(w0, w, solver):
+    return w0 + SIZE * np.maximum(1.0, np.abs(w0)) * np.random.default_rng(SEED).standard_normal(len(w0))
+
+
+LADDER = (
+    Recovery("go on with a smaller eps", lambda w0, w, solver: w, lambda first, last, factor: last * factor),
+    Recovery("start again, other form", lambda w0, w, solver: w0, lambda first, last, factor: first * 1e-2, other_form=True),
+    Recovery("restore feasibility, raise eps", lambda w0, w, solver: solver.restore(w), lambda first, last, factor: first * 10),
+    Recovery("perturb the start", _perturbed, lambda first, last, factor: first * 1e-2),
+    Recovery("raise eps, other form", lambda w0, w, solver: w0, lambda first, last, factor: first * 100, other_form=True),
+)

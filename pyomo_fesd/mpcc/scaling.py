@@ -1,0 +1,45 @@
+"""Scaling: the solver works with s_x x, s_g g, s_f f and sides s_G G, s_H H.
+
+The user's factors are Pyomo's: a Suffix ``scaling_factor`` on any block, for variables, constraints, the objective and
+complementarities.  A side that is a plain variable has that variable's factor; any other side without a factor of its own is
+scaled to a largest gradient entry of 1 when that is far from 1, because "both sides are zero" is judged by absolute tolerances.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pyomo.core import Suffix
+from pyomo.core.base.suffix import SuffixFinder
+
+#: Gradients of a side within these bounds are left as they are.
+MILD = (1e-2, 1e2)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Factors of variables x (n), rows g (m), the objective f and sides (2q): solver's value = factor * model's value."""
+
+    x: np.ndarray
+    g: np.ndarray
+    f: float
+    sides: np.ndarray
+
+
+class UserFactors:
+    """Pyomo's ``scaling_factor`` suffixes of a model; every factor is 1 where there are none or they are not wanted."""
+
+    def __init__(self, model, wanted):
+        present = any(s.local_name == 'scaling_factor' for s in model.component_objects(Suffix, active=True))
+        self._find = SuffixFinder('scaling_factor', 1.0, model).find if wanted and present else None
+
+    def of(self, components):
+        """Factors of ``components``, as an array."""
+        if self._find is None:
+            return np.ones(len(components))
+        return np.array([1.0 if c is None else abs(float(self._find(c))) or 1.0 for c in components])
+
+
+def side_factors(largest, given):
+    """Factors for sides whose largest gradient entries are ``largest``; a factor that the user gave (not 1) stands."""
+    strange = (given == 1.0) & (largest > 0) & ((largest < MILD[0]) | (largest > MILD[1]))
+    return np.where(strange, 1.0 / np.where(largest > 0, largest, 1.0), given)

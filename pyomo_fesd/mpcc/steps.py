@@ -1,0 +1,154 @@
+"""Single steps of the hybrid algorithm: each is checked against the limits, timed, counted and shown."""
+
+import time
+from contextlib import contextmanager
+
+import numpy as np
+
+from pyomo_fesd.mpcc.branch import Branch
+from pyomo_fesd.mpcc.feasibility import Feasibility
+from pyomo_fesd.mpcc.lpec import Lpec
+from pyomo_fesd.mpcc.relaxation import RELAXATIONS
+from pyomo_fesd.mpcc.run import Outcome, Step, Stop
+from pyomo_fesd.mpcc.sides import sort_sides
+from pyomo_fesd.mpcc.stationarity import certify
+
+#: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
+BIACTIVE = 3.0
+
+
+class Steps:
+    """The NLPs and LPECs of one compiled MPCC, built when they are first needed.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    options : ConfigDict
+        of ``mpec_hybrid``
+    tolerances : Tolerances
+    run : Run
+        what the steps are recorded in
+    timer : HierarchicalTimer
+    show : callable Step -> None
+        called after each NLP and LPEC
+    deadline : float or None
+        value of ``time.perf_counter()`` at which to stop
+    """
+
+    def __init__(self, compiled, options, tolerances, run, timer, show, deadline):
+        self._c, self._options, self._tolerances, self.run = compiled, options, tolerances, run
+        self._timer, self._show, self._deadline = timer, show, deadline
+        with self._timed('build'):
+            self._sides = sort_sides(compiled)
+        self._built = {}
+        self._lpec = Lpec(compiled, self._sides, options.lpec_options.value(), deadline)
+
+    # what the algorithm calls
+
+    def relax(self, form, w, eps, duals):
+        """Reg(eps) in a form of ``RELAXATIONS``, from ``w`` and perhaps a result of the same form."""
+        kind, rows = RELAXATIONS[form]
+        nlp = self._build(form, lambda ipopt: kind(self._c, self._sides, rows, ipopt, self._deadline), **self._budget('relaxation'))
+        return self._nlp('relaxation', eps, lambda: nlp.solve(w, eps, duals))
+
+    def restore(self, w, eps):
+        """The feasibility phase."""
+        nlp = self._build(
+            'feasibility', lambda ipopt: Feasibility(self._c, self._sides, ipopt, self._deadline), **self._budget('relaxation')
+        )
+        return self._nlp('restoration', eps, lambda: nlp.solve(w, eps))
+
+    def branch(self, w, zero, equal, weight, **more):
+        """A branch NLP; None if it contradicts the bounds or ends nowhere."""
+        nlp = self._build(
+            'branch', lambda ipopt: Branch(self._c, self._sides, ipopt, self._deadline), **self._budget('branch')
+        )
+        result = self._nlp('branch', 0.0, lambda: nlp.solve(w, zero, equal, weight, **more))
+        return result if result is not None and self.usable(result) else None
+
+    def lpec(self, w, sets, Delta, equal=None, **more):
+        """An LPEC that only has to point to a good branch."""
+        with self._timed('lpec') as started:
+            result = self._lpec.solve(w, sets, Delta, equal, **more)
+        self._count(result)
+        self._log('lpec', 0.0, w, 0, f'{result.value:.1e}' if result.solved else 'unsolved', started)
+        return result
+
+    def certify(self, nlp, equal):
+        """The certificate for the solution of a branch NLP."""
+        with self._timed('lpec') as started:
+            certificate = certify(self._c, self._lpec, nlp.w, self._tolerances, equal, -nlp.lam_g)
+        if certificate.lpec is not None:
+            self._count(certificate.lpec)
+        self._log('certificate', 0.0, nlp.w, 0, certificate.grade.name, started)
+        return certificate
+
+    def note(self, what, w):
+        """A line in the log that costs nothing."""
+        self._log('recovery', 0.0, w, 0, what, time.perf_counter())
+
+    def usable(self, result):
+        """Whether an NLP's point can lead on: solved, or stopped where its constraints hold."""
+        return result.solved or self.violation(result.w) <= self._tolerances.feasibility
+
+    def violation(self, w):
+        """The largest violation of rows and bounds."""
+        rows, bounds = self._c.violations(w)
+        return float(max(rows.max(initial=0.0), bounds.max(initial=0.0)))
+
+    def biactive(self, at):
+        """Below this both sides of a pair may be zero at the solution: O(sqrt) of the largest product left (eq. 16)."""
+        return max(BIACTIVE * np.sqrt(np.max(at.G * at.H, initial=0.0)), self._tolerances.biactive)
+
+    # how they run
+
+    def _budget(self, kind):
+        options = self._options
+        return {'max_iter': getattr(options, f'{kind}_iterations'), 'tol': getattr(options, f'{kind}_tol')}
+
+    def _build(self, name, make, **budget):
+        if name not in self._built:
+            with self._timed('build'):
+                self._built[name] = make(budget | self._options.nlp_options.value())
+        return self._built[name]
+
+    def _nlp(self, kind, eps, solve):
+        with self._timed(kind) as started:
+            result = solve()
+        if result is not None:
+            self.run.counts.nlps += 1
+            self.run.counts.iterations += result.iterations
+            self._log(kind, eps, result.w, result.iterations, result.status, started)
+        return result
+
+    @contextmanager
+    def _timed(self, kind):
+        """Check the limits, then time what follows; gives the time at which it began."""
+        self._check_limits()
+        self._timer.start(kind)
+        try:
+            yield time.perf_counter()
+        finally:
+            self._timer.stop(kind)
+
+    def _check_limits(self):
+        if self._deadline is not None and time.perf_counter() > self._deadline:
+            raise Stop(Outcome.TIME_LIMIT)
+        if self.run.counts.iterations >= self._options.max_iterations:
+            raise Stop(Outcome.ITERATION_LIMIT)
+
+    def _count(self, result):
+        self.run.counts.lpecs += 1
+        self.run.counts.binaries = max(self.run.counts.binaries, result.binaries)
+
+    def _log(self, kind, eps, w, iterations, status, started):
+        c = self._c
+        at = c.evaluate(w)
+        low = np.minimum(at.G, at.H)
+        violation = max(self.violation(w), -low.min(initial=0.0))
+        biactive = int(np.count_nonzero(np.maximum(at.G, at.H) <= self.biactive(at)))
+        gap = float(np.abs(low).max(initial=0.0))
+        seconds = time.perf_counter() - started
+        step = Step(kind, eps, c.objective(at.f), float(violation), gap, biactive, iterations, status, seconds, w)
+        self.run.steps.append(step)
+        self._show(step)
