@@ -1,17 +1,21 @@
-"""Ipopt, the one inside casadi's wheel, built once for a graph and called with changing bounds, parameter and start."""
+"""The NLP solvers to choose from, by the option ``nlp_solver``, and what they have in common.
 
-import io
-import logging
+Takes: the name of one.
+Leaves: a class with the contract of ``NlpSolver``; its module, and with it what is optional, is imported only then.
+"""
+
+import importlib
 import signal
 import threading
-import time
-from contextlib import contextmanager, redirect_stderr
-from dataclasses import dataclass, replace
+from abc import ABC, abstractmethod
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 
 import casadi as ca
 import numpy as np
 
-logger = logging.getLogger('pyomo_fesd')
+from pyomo_fesd.errors import FesdError
 
 #: Measured as clearly the best of five settings on switching problems; the default monotone one fails on most of them.
 IPOPT = {
@@ -26,17 +30,40 @@ IPOPT = {
     'print_level': 0,
     'sb': 'yes',
 }
-#: For a start with multipliers: neither they nor the point are pushed far from their bounds.
-WARM_DUALS = {'warm_start_init_point': 'yes'} | {
-    f'warm_start_{name}': 1e-6 for name in ('bound_push', 'bound_frac', 'slack_bound_push', 'slack_bound_frac', 'mult_bound_push')
+#: What the solvers say of a stationary, feasible point: Ipopt, Uno, and an executable in Pyomo's words.
+SOLVED = (
+    'Solve_Succeeded',
+    'Solved_To_Acceptable_Level',
+    'Feasible_Point_Found',
+    'Converged with feasible KKT point',
+    'optimal',
+)
+#: A row without variables may miss its bounds by this much.
+ROW_TOLERANCE = 1e-8
+#: ``nlp_solver`` -> module, class, how to get it; every other name is an executable.
+NLP_SOLVERS = {
+    'ipopt': ('nlp_casadi', 'CasadiIpopt', "pip install casadi"),
+    'uno': ('nlp_casadi', 'CasadiUno', "pip install 'casadi>=3.8'"),
+    'cyipopt': (
+        'nlp_cyipopt',
+        'CyIpopt',
+        "pip install cyipopt, on Debian or Ubuntu after apt-get install coinor-libipopt-dev liblapack-dev libblas-dev pkg-config "
+        "gcc g++",
+    ),
 }
-NOT_BEGUN = ('Not_Enough_Degrees_Of_Freedom', 'Invalid_Problem_Definition', 'Invalid_Option')
-SOLVED = ('Solve_Succeeded', 'Solved_To_Acceptable_Level', 'Feasible_Point_Found')
+EXECUTABLE = (
+    'nlp_executable',
+    'Executable',
+    "for 'pounce': pip install pyomo-pounce; for others, put an executable that reads NL files on the PATH, or give its path",
+)
 
 
 @dataclass(frozen=True)
 class NlpResult:
-    """Outcome of one NLP: point, Ipopt's own status, iterations, multipliers of the rows (casadi's sign)."""
+    """Outcome of one NLP: point, the solver's own status, iterations, multipliers of rows and bounds (casadi's sign).
+
+    The gradient of ``f + lam_g g + lam_x w`` is zero: a multiplier is positive where an upper bound holds the point.
+    """
 
     w: np.ndarray
     f: float
@@ -47,7 +74,7 @@ class NlpResult:
 
     @property
     def solved(self):
-        """Whether Ipopt reports a stationary, feasible point."""
+        """Whether the solver reports a stationary, feasible point."""
         return self.status in SOLVED
 
     def shortened(self, n):
@@ -59,9 +86,128 @@ class NlpResult:
         return replace(self, lam_x=lam_x, lam_g=lam_g)
 
 
+class NlpSolver(ABC):
+    """``min f(w; p)  s.t.  lbg <= g(w; p) <= ubg, lbx <= w <= ubx``, built once, for changing bounds and parameter p.
+
+    Parameters
+    ----------
+    name : str
+    x, p, f, g : SX
+    budget : dict
+        our wishes, in Ipopt's names (``max_iter``, ``tol``, ``mu_init``, ...); each solver follows those that it has
+    deadline : float or None
+        value of ``time.perf_counter()`` at which to stop
+    jacobian : SX, optional
+        of g by x, where it is known more cheaply than casadi finds it (one dense column defeats its colouring)
+    options : dict, optional
+        the user's, in the solver's own names; they are passed through and win
+
+    Raises
+    ------
+    FesdError
+        naming an option that the solver refuses
+    """
+
+    @staticmethod
+    def missing(name):
+        """Why the solver ``name`` cannot be used; None if it can."""
+        return None
+
+    @abstractmethod
+    def __init__(self, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
+        pass
+
+    @abstractmethod
+    def solve(self, w0, p, lbx, ubx, lbg, ubg):
+        """Solve from ``w0``; never raises for an unsolved problem, the status says it.
+
+        Infinite bounds are ``np.inf``; a row or variable with two of them is free, one with equal bounds is an equation or fixed.
+
+        Returns
+        -------
+        NlpResult
+            with the last point, whatever the status
+        """
+
+
+def nlp_solver(name):
+    """The class (or a callable with its signature) of the solver ``name``.
+
+    Parameters
+    ----------
+    name : str
+        a key of ``NLP_SOLVERS``, or what Pyomo's ``SolverFactory`` makes an executable of that reads NL files: ``'pounce'``,
+        ``'asl:ipopt'`` (``'ipopt'`` alone is casadi's), a path
+
+    Raises
+    ------
+    FesdError
+        saying how to get a solver that is not there
+    """
+    module, kind, get = NLP_SOLVERS.get(name, EXECUTABLE)
+    try:
+        kind = getattr(importlib.import_module(f'pyomo_fesd.mpcc.{module}'), kind)
+        reason = kind.missing(name)
+    except ImportError as error:
+        reason = str(error)
+    if reason:
+        others = ', '.join(f"'{other}'" for other in NLP_SOLVERS if other != name)
+        raise FesdError(f"nlp_solver='{name}'", f"this NLP solver is not there: {reason}", f"{get}; or choose among {others}")
+    return kind if name in NLP_SOLVERS else partial(kind, name)
+
+
+def check_options(name, options, complaint):
+    """Raise if the solver refuses the user's options, with the name of the one that it refuses.
+
+    Parameters
+    ----------
+    complaint : callable dict -> str or None
+        what the solver says against these options
+    """
+    said = complaint(options) if options else None
+    if said is None:
+        return
+    key, shown = ', '.join(options), 'this combination'
+    # some make sense only together, so each alone is asked only now
+    for alone, value in options.items():
+        against = complaint({alone: value})
+        if against is not None:
+            key, shown, said = alone, repr(value), against
+            break
+    raise FesdError(
+        f"nlp_options['{key}']",
+        f"{name} refuses {shown}: {' '.join(said.split())}",
+        f"nlp_options go to {name} unchanged: take names and values from its documentation",
+    )
+
+
+def accepted(wishes, complaint):
+    """Those of our ``wishes`` (dict) that the solver takes."""
+    if complaint(wishes) is None:
+        return wishes
+    return {key: value for key, value in wishes.items() if complaint({key: value}) is None}
+
+
+def bound_multipliers(gradient, lbx, ubx):
+    """Multipliers of the bounds that make a point stationary, from the gradient of ``f + lam_g g`` there."""
+    return np.clip(-gradient, np.where(np.isfinite(lbx), -np.inf, 0.0), np.where(np.isfinite(ubx), np.inf, 0.0))
+
+
+def rows_with_variables(g, x):
+    """Mask over the rows; some solvers cannot take one without variables: it holds or it does not."""
+    rows = np.zeros(g.numel(), dtype=bool)
+    rows[ca.jacobian(g, x).sparsity().row()] = True
+    return rows
+
+
+def violated(g, lbg, ubg):
+    """Mask over the rows with values ``g``."""
+    return (g < lbg - ROW_TOLERANCE) | (g > ubg + ROW_TOLERANCE)
+
+
 @contextmanager
-def _interruptible():
-    """Let Ctrl-C through: casadi turns it into an Ipopt status, so it is remembered here and raised again afterwards."""
+def interruptible():
+    """Let Ctrl-C through: a solver turns it into a status of its own, so it is remembered here and raised again afterwards."""
     pressed = []
 
     def remember(*args):
@@ -80,92 +226,14 @@ def _interruptible():
         raise KeyboardInterrupt
 
 
-class _Watch(ca.Callback):
-    """Asks Ipopt to stop when the time is up or the iterations that this call may use are spent."""
-
-    def __init__(self, n, m, p, until):
-        super().__init__()
-        self._sizes, self._until, self.left = (n, m, p), until, None
-        self.construct('watch', {})
-
-    def get_n_in(self):
-        return ca.nlpsol_n_out()
-
-    def get_n_out(self):
-        return 1
-
-    def get_sparsity_in(self, i):
-        n, m, p = self._sizes
-        length = {'x': n, 'lam_x': n, 'f': 1, 'g': m, 'lam_g': m, 'lam_p': p}[ca.nlpsol_out(i)]
-        return ca.Sparsity.dense(length, 1)
-
-    def eval(self, arg):
-        if self.left is not None:
-            self.left -= 1
-            if self.left < 0:
-                return [1.0]
-        return [float(self._until is not None and time.perf_counter() > self._until)]
+def lagrangian_gradient(x, p, f, g):
+    """Function (x, p, lam_g) -> gradient of ``f + lam_g g`` by x."""
+    lam = ca.SX.sym('lam', g.numel())
+    return ca.Function('gradient', [x, p, lam], [ca.densify(ca.gradient(f + ca.dot(lam, g), x))])
 
 
-class Nlp:
-    """``min f(w; p)  s.t.  lbg <= g(w) <= ubg, lbx <= w <= ubx`` for changing bounds and parameter p.
-
-    Parameters
-    ----------
-    x, p, f, g : SX
-    options : dict
-        Ipopt options, over ``IPOPT``
-    deadline : float or None
-        value of ``time.perf_counter()`` at which to stop
-    jacobian : SX, optional
-        of g by x, where it is known more cheaply than casadi finds it (one dense column defeats its colouring)
-    """
-
-    def __init__(self, name, x, p, f, g, options, deadline=None, jacobian=None):
-        self._watch = _Watch(x.numel(), g.numel(), p.numel(), deadline)
-        self._settings = {'print_time': False, 'ipopt': IPOPT | options, 'iteration_callback': self._watch}
-        if jacobian is not None:
-            self._settings['jac_g'] = ca.Function('nlp_jac_g', [x, p], [g, jacobian], ['x', 'p'], ['g', 'jac_g_x'])
-        self._problem = {'x': x, 'p': p, 'f': f, 'g': g}
-        self._name = name
-        self._cold, self._warm = ca.nlpsol(name, 'ipopt', self._problem, self._settings), None
-
-    def _solver(self, duals):
-        """The solver for a start without or with multipliers; both use the same derivatives."""
-        if duals is None:
-            return self._cold
-        if self._warm is None:
-            derivatives = {
-                option: self._cold.get_function(name)
-                for option, name in (('grad_f', 'nlp_grad_f'), ('jac_g', 'nlp_jac_g'), ('hess_lag', 'nlp_hess_l'))
-            }
-            settings = self._settings | derivatives | {'ipopt': WARM_DUALS | self._settings['ipopt']}
-            self._warm = ca.nlpsol(self._name, 'ipopt', self._problem, settings)
-        return self._warm
-
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
-        """Solve from ``w0``; never raises for an unsolved problem, the status says it.
-
-        Parameters
-        ----------
-        duals : NlpResult, optional
-            multipliers to start from
-        max_iter : int, optional
-            iterations that this call may use
-        """
-        solver = self._solver(duals)
-        self._watch.left = max_iter
-        start = {} if duals is None else {'lam_x0': duals.lam_x, 'lam_g0': duals.lam_g}
-        said = io.StringIO()
-        with redirect_stderr(said), _interruptible():
-            result = solver(x0=w0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg, **start)
-        if said.getvalue():
-            logger.debug("casadi: %s", said.getvalue())
-        stats = solver.stats()
-        w, lam_g, lam_x = (np.asarray(result[key], dtype=float).ravel() for key in ('x', 'lam_g', 'lam_x'))
-        return NlpResult(w, float(result['f']), stats['return_status'], _iterations(stats), lam_g, lam_x)
-
-
-def _iterations(stats):
-    """Ipopt leaves its counter unset when it does not begin."""
-    return int(stats['iter_count']) if stats['return_status'] not in NOT_BEGUN else 0
+def __getattr__(name):
+    # until all callers choose by ``nlp_solver``
+    if name == 'Nlp':
+        return nlp_solver('ipopt')
+    raise AttributeError(name)

@@ -1,0 +1,193 @@
+"""The NLP solvers inside casadi's wheel: Ipopt (the default) and Uno."""
+
+import ctypes
+import io
+import logging
+import os
+import time
+from abc import abstractmethod
+from contextlib import redirect_stderr
+from dataclasses import replace
+from functools import cache
+
+import casadi as ca
+import numpy as np
+from pyomo.common.tee import capture_output
+
+from pyomo_fesd.mpcc.nlp import IPOPT, NlpResult, NlpSolver, check_options, interruptible, rows_with_variables, violated
+
+logger = logging.getLogger('pyomo_fesd')
+
+#: Variables and rows from which Uno's sequential quadratic programming, much the better of its presets, gets too slow.
+UNO_LARGE = 2000
+#: Our wishes in Uno's names.
+UNO_NAMES = {
+    'max_iter': ('max_iterations',),
+    'tol': ('primal_tolerance', 'dual_tolerance'),
+    'mu_init': ('barrier_initial_parameter',),
+    'bound_push': ('barrier_push_variable_to_interior_k1',),
+    'bound_frac': ('barrier_push_variable_to_interior_k2',),
+}
+#: Where casadi's word for Uno's outcome says more than its own "not optimal point".
+UNIFIED = {'SOLVER_RET_LIMITED': 'iteration or time limit', 'SOLVER_RET_NAN': 'error'}
+#: Ends of the tiny problem on which options are tried that only these can have caused.
+REFUSED = ('Invalid_Option', 'error')
+#: Uno's own numbers for the types of its options.
+UNO_TYPES = {0: int, 1: float, 2: bool, 3: str}
+
+
+class _Deadline(ca.Callback):
+    """Asks the solver to stop when the time is up."""
+
+    def __init__(self, n, m, p, until):
+        super().__init__()
+        self._sizes, self._until = (n, m, p), until
+        self.construct('deadline', {})
+
+    def get_n_in(self):
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self):
+        return 1
+
+    def get_sparsity_in(self, i):
+        n, m, p = self._sizes
+        length = {'x': n, 'lam_x': n, 'f': 1, 'g': m, 'lam_g': m, 'lam_p': p}[ca.nlpsol_out(i)]
+        return ca.Sparsity.dense(length, 1)
+
+    def eval(self, arg):
+        return [float(time.perf_counter() > self._until)]
+
+
+class _CasadiNlp(NlpSolver):
+    """What the two have in common: casadi's ``nlpsol``.  See ``NlpSolver``."""
+
+    #: Name of casadi's plug-in, what keeps it silent, whether it takes a Jacobian.
+    PLUGIN, SILENT, TAKES_JACOBIAN = '', {}, False
+
+    @staticmethod
+    def missing(name):
+        """Why casadi does not have it; None if it does."""
+        return None if ca.has_nlpsol(name) else f"casadi {ca.__version__} was built without it"
+
+    def __init__(self, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
+        self._size, options = x.numel() + g.numel(), options or {}
+        check_options(self.PLUGIN, options, self._complaint)
+        settings = {'print_time': False, self.PLUGIN: self._settings(budget, options)}
+        if jacobian is not None and self.TAKES_JACOBIAN:
+            settings['jac_g'] = ca.Function('nlp_jac_g', [x, p], [g, jacobian], ['x', 'p'], ['g', 'jac_g_x'])
+        if deadline is not None:
+            self._deadline = _Deadline(x.numel(), g.numel(), p.numel(), deadline)
+            settings['iteration_callback'] = self._deadline
+        self._solver = ca.nlpsol(name, self.PLUGIN, {'x': x, 'p': p, 'f': f, 'g': g}, settings)
+
+    @abstractmethod
+    def _settings(self, budget, options):
+        """What to pass to the solver."""
+
+    def _status(self, stats):
+        """The solver's own status from casadi's statistics."""
+        return stats['return_status']
+
+    def _complaint(self, options):
+        """What the solver says against these options on a tiny problem; None if it takes them."""
+        x, said = ca.SX.sym('x'), io.StringIO()
+        with capture_output(said, capture_fd=True):
+            try:
+                settings = {'print_time': False, self.PLUGIN: self._settings({}, options | self.SILENT)}
+                solver = ca.nlpsol('probe', self.PLUGIN, {'x': x, 'f': (x - 1) ** 2}, settings)
+                solver(x0=0.0)
+            except (RuntimeError, ValueError) as error:
+                return f'{said.getvalue()} {str(error).splitlines()[-1]}'
+        return "invalid value" if self._status(solver.stats()) in REFUSED else None
+
+    def solve(self, w0, p, lbx, ubx, lbg, ubg):
+        """Solve from ``w0``; see ``NlpSolver``."""
+        said = io.StringIO()
+        with redirect_stderr(said), interruptible():
+            try:
+                result = self._solver(x0=w0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
+            except RuntimeError as error:
+                if 'An exception was raised in the solver' not in str(error):
+                    raise
+                return self._failed(w0, p, len(lbg))
+        if said.getvalue():
+            logger.debug("casadi: %s", said.getvalue())
+        stats = self._solver.stats()
+        w, lam_g, lam_x = (np.asarray(result[key], dtype=float).ravel() for key in ('x', 'lam_g', 'lam_x'))
+        return NlpResult(w, float(result['f']), self._status(stats), int(stats['iter_count']), lam_g, lam_x)
+
+    def _failed(self, w0, p, m, status='error'):
+        """The result where the solver gives no point."""
+        w = np.array(w0, dtype=float)
+        f = float(self._solver.get_function('nlp_f')(w, p))
+        return NlpResult(w, f, status, 0, np.zeros(m), np.zeros(len(w)))
+
+
+class CasadiIpopt(_CasadiNlp):
+    """Ipopt.  See ``NlpSolver``."""
+
+    PLUGIN, SILENT, TAKES_JACOBIAN = 'ipopt', {'print_level': 0, 'sb': 'yes'}, True
+
+    def _settings(self, budget, options):
+        return IPOPT | budget | options
+
+
+class CasadiUno(_CasadiNlp):
+    """Uno as 'filtersqp' on small problems and 'ipopt' on large ones; ``preset`` is one of its options.  See ``NlpSolver``."""
+
+    PLUGIN, SILENT = 'uno', {'logger': 'SILENT'}
+
+    @staticmethod
+    def missing(name):
+        """Why casadi's Uno cannot be used; None if it can."""
+        try:
+            return _CasadiNlp.missing(name) or (_uno() and None)
+        except (OSError, AttributeError) as error:
+            return f"casadi {ca.__version__} has none with a C interface ({error})"
+
+    def __init__(self, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
+        # on a violated row without variables Uno's QP solver may never return, whatever the limits
+        self._varying, self._g = rows_with_variables(g, x), ca.Function('g', [x, p], [ca.densify(g)])
+        super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, jacobian, options)
+
+    def solve(self, w0, p, lbx, ubx, lbg, ubg):
+        """Solve from ``w0``; see ``NlpSolver``."""
+        varying = self._varying
+        g, lam_g = self._g(w0, p).full().ravel(), np.zeros(len(varying))
+        if np.any(violated(g, lbg, ubg) & ~varying):
+            return self._failed(w0, p, len(varying), 'infeasible')
+        result = super().solve(w0, p, lbx, ubx, lbg[varying], ubg[varying])
+        lam_g[varying] = result.lam_g
+        return replace(result, lam_g=lam_g)
+
+    def _settings(self, budget, options):
+        # without the types casadi would drop what Uno does not take, silently
+        ours = {new: value for old, value in budget.items() for new in UNO_NAMES.get(old, ())}
+        ours |= {'logger': 'SILENT', 'preset': 'filtersqp' if self._size < UNO_LARGE else 'ipopt'}
+        return {name: _uno_type(name)(value) for name, value in (ours | options).items()}
+
+    def _status(self, stats):
+        return UNIFIED.get(stats['unified_return_status'], stats['return_status'])
+
+
+def _uno_type(name):
+    """The type of Uno's option ``name``, asked of its C library."""
+    uno, solver = _uno()
+    kind = uno.uno_get_solver_option_type(solver, name.encode())
+    if kind not in UNO_TYPES:
+        raise ValueError("there is no such option")
+    return UNO_TYPES[kind]
+
+
+@cache
+def _uno():
+    """Uno's C library and a solver of its own, or an OSError."""
+    folder = os.path.dirname(ca.__file__)
+    files = [f for f in (os.path.join(folder, f'libuno.{end}') for end in ('so', 'dylib', 'dll')) if os.path.exists(f)]
+    if not files:
+        raise OSError(f"no libuno in {folder}")
+    uno = ctypes.CDLL(files[0])
+    uno.uno_create_solver.restype = ctypes.c_void_p
+    uno.uno_get_solver_option_type.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
+    return uno, uno.uno_create_solver()

@@ -1,0 +1,155 @@
+"""The system's Ipopt through cyipopt, with casadi's functions and exact derivatives."""
+
+import io
+import time
+from functools import cache
+
+import casadi as ca
+import cyipopt
+import numpy as np
+from pyomo.common.tee import capture_output
+
+from pyomo_fesd.mpcc.nlp import (
+    IPOPT,
+    NlpResult,
+    NlpSolver,
+    accepted,
+    bound_multipliers,
+    check_options,
+    interruptible,
+    lagrangian_gradient,
+)
+
+#: Ipopt's numbers in its own words, as casadi reports them.
+STATUS = {
+    0: 'Solve_Succeeded',
+    1: 'Solved_To_Acceptable_Level',
+    2: 'Infeasible_Problem_Detected',
+    3: 'Search_Direction_Becomes_Too_Small',
+    4: 'Diverging_Iterates',
+    5: 'User_Requested_Stop',
+    6: 'Feasible_Point_Found',
+    -1: 'Maximum_Iterations_Exceeded',
+    -2: 'Restoration_Failed',
+    -3: 'Error_In_Step_Computation',
+    -4: 'Maximum_CpuTime_Exceeded',
+    -5: 'Maximum_WallTime_Exceeded',
+    -10: 'Not_Enough_Degrees_Of_Freedom',
+    -11: 'Invalid_Problem_Definition',
+    -12: 'Invalid_Option',
+    -13: 'Invalid_Number_Detected',
+    -100: 'Unrecoverable_Exception',
+    -101: 'NonIpopt_Exception_Thrown',
+    -102: 'Insufficient_Memory',
+    -199: 'Internal_Error',
+}
+SILENT = {'print_level': 0, 'sb': 'yes'}
+
+
+class _Callbacks:
+    """The functions that Ipopt calls, in cyipopt's names, for one value of the parameter."""
+
+    def __init__(self, functions, jacobian, hessian, deadline):
+        self._functions, self._structures, self._deadline = functions, (jacobian, hessian), deadline
+        self.p, self.iterations = [], 0
+
+    def _value(self, which, *args):
+        """The nonzeros; Ipopt shortens its step where they are not finite."""
+        value = self._functions[which](*args).full().ravel()
+        if not np.isfinite(value).all():
+            raise cyipopt.CyIpoptEvaluationError(which)
+        return value
+
+    def objective(self, x):
+        return self._value('f', x, self.p)[0]
+
+    def gradient(self, x):
+        return self._value('gradient', x, self.p)
+
+    def constraints(self, x):
+        return self._value('g', x, self.p)
+
+    def jacobian(self, x):
+        return self._value('jacobian', x, self.p)
+
+    def jacobianstructure(self):
+        return self._structures[0]
+
+    def hessian(self, x, lam, weight):
+        return self._value('hessian', x, self.p, lam, weight)
+
+    def hessianstructure(self):
+        return self._structures[1]
+
+    def intermediate(self, mode, iteration, *args):
+        self.iterations = iteration
+        return self._deadline is None or time.perf_counter() <= self._deadline
+
+
+class CyIpopt(NlpSolver):
+    """Ipopt of the system.  Defaults of ours that its version does not know are left out.  See ``NlpSolver``."""
+
+    def __init__(self, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
+        jacobian = ca.jacobian(g, x) if jacobian is None else jacobian
+        lam, weight = ca.SX.sym('lam', g.numel()), ca.SX.sym('weight')
+        hessian = ca.tril(ca.hessian(weight * f + ca.dot(lam, g), x)[0])
+        functions = {
+            'f': ca.Function('f', [x, p], [f]),
+            'g': ca.Function('g', [x, p], [ca.densify(g)]),
+            'gradient': ca.Function('gradient', [x, p], [ca.densify(ca.gradient(f, x))]),
+            'jacobian': ca.Function('jacobian', [x, p], [jacobian.nz[:]]),
+            'hessian': ca.Function('hessian', [x, p, lam, weight], [hessian.nz[:]]),
+        }
+        self._callbacks = _Callbacks(functions, _places(jacobian), _places(hessian), deadline)
+        self._f, self._lagrangian = functions['f'], lagrangian_gradient(x, p, f, g)
+        options = options or {}
+        check_options('cyipopt', options, _complaint)
+        self._options = _accepted(tuple((IPOPT | budget).items())) | options
+
+    def solve(self, w0, p, lbx, ubx, lbg, ubg):
+        """Solve from ``w0``; see ``NlpSolver``."""
+        called = self._callbacks
+        called.p, called.iterations = p, 0
+        problem = cyipopt.Problem(n=len(lbx), m=len(lbg), problem_obj=called, lb=lbx, ub=ubx, cl=lbg, cu=ubg)
+        for key, value in self._options.items():
+            problem.add_option(key, value)
+        with interruptible():
+            w, info = problem.solve(np.array(w0, dtype=float))
+        problem.close()
+        # older Ipopts give no multipliers to fixed variables, casadi's does
+        lam_x = bound_multipliers(self._lagrangian(w, p, info['mult_g']).full().ravel(), lbx, ubx)
+        return NlpResult(w, float(self._f(w, p)), STATUS[info['status']], called.iterations, np.array(info['mult_g']), lam_x)
+
+
+def _places(matrix):
+    """Rows and columns of the nonzeros."""
+    return tuple(np.array(part, dtype=int) for part in matrix.sparsity().get_triplet())
+
+
+@cache
+def _accepted(wishes):
+    return accepted(dict(wishes), _complaint)
+
+
+class _Tiny:
+    """An NLP on which options are tried."""
+
+    def objective(self, x):
+        return (x[0] - 1) ** 2
+
+    def gradient(self, x):
+        return 2 * (x - 1)
+
+
+def _complaint(options):
+    """What Ipopt says against these options; None if it takes them."""
+    problem = cyipopt.Problem(n=1, m=0, problem_obj=_Tiny(), lb=[0.0], ub=[2.0])
+    said = io.StringIO()
+    with capture_output(said, capture_fd=True):
+        try:
+            for key, value in (options | SILENT).items():
+                problem.add_option(key, value)
+        except TypeError as error:
+            return f'{said.getvalue()} {error}'
+        _, info = problem.solve(np.zeros(1))
+    return "invalid value" if STATUS[info['status']] == 'Invalid_Option' else None
