@@ -35,6 +35,7 @@ from pyomo.core.staleflag import StaleFlagManager
 from pyomo_fesd import marks
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.mpcc.compile import compile_problem
+from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.hybrid import HybridSolver
 from pyomo_fesd.mpcc.lpec import Lpec
 from pyomo_fesd.mpcc.problem import read_problem
@@ -78,7 +79,14 @@ class MpecHybridConfig(SolverConfig):
                 "form of Reg(eps): 'elastic' (one slack, weight 1/eps), 'scholtes' (products <= eps), or 'auto': elastic without an "
                 "objective, scholtes with one, the other after a failure",
             ),
-            ('relaxation_tol', 1e-6, PositiveFloat, "Ipopt's tol for relaxations, which only lead to a branch"),
+            (
+                'nlp_solver',
+                'ipopt',
+                str,
+                "NLP solver: 'ipopt' (the one in casadi's wheel), 'uno' (also there), 'cyipopt' (the system's Ipopt), or an executable "
+                "that reads NL files and that Pyomo knows, e.g. 'pounce', 'asl:ipopt'",
+            ),
+            ('relaxation_tol', 1e-4, PositiveFloat, "Ipopt's tol for relaxations, which only lead to a branch"),
             ('relaxation_iterations', 500, PositiveInt, "Ipopt iterations allowed to one relaxation"),
             ('gap_tol', 5e-5, PositiveFloat, "gap test: relative distance of the incumbent to the relaxed objective that ends the run"),
             ('feasibility_tol', 1e-6, PositiveFloat, "largest scaled violation and complementarity of a reported point"),
@@ -197,7 +205,7 @@ class MpecHybrid(SolverBase):
             compiled = compile_problem(problem, timer, config.working_dir)
         timer.stop('compile')
         table = Table(config.tee, compiled)
-        deadline = None if config.time_limit is None else started + config.time_limit
+        deadline = Deadline(None if config.time_limit is None else started + config.time_limit)
         run = HybridSolver(compiled, config, timer, table.row, deadline).solve()
         _fill(results, model, compiled, run)
         results.solver_config = config

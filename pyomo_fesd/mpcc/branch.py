@@ -12,7 +12,6 @@ import casadi as ca
 import numpy as np
 
 from pyomo_fesd.mpcc.compiled import csr_pattern
-from pyomo_fesd.mpcc.nlp import Nlp
 
 #: A branch starts near its solution, but neither so close to the bounds that Ipopt cannot turn, nor pushed far from them.
 NEAR = {
@@ -34,18 +33,18 @@ class Branch:
     ----------
     compiled : Compiled
     sides : Sides
-    options : dict
-        Ipopt options
+    make : callable
+        makes an ``NlpSolver`` from a name, x, p, f, g and perhaps a budget and a Jacobian
     """
 
-    def __init__(self, compiled, sides, options, deadline):
+    def __init__(self, compiled, sides, make):
         c = compiled
         self._c, self._sides = c, sides
         weight = ca.SX.sym('weight')
         g = ca.vertcat(c.g, sides.rows, c.equal)
         self._pattern = csr_pattern(ca.jacobian(g, c.x))
         self._values = ca.Function('rows', [c.x, c.p], [g])
-        self._nlp = Nlp('branch', c.x, ca.vertcat(weight, c.p), c.f + weight * c.penalty, g, NEAR | options, deadline)
+        self._nlp = make('branch', c.x, ca.vertcat(weight, c.p), c.f + weight * c.penalty, g, budget=NEAR)
 
     def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None):
         """Solve the branch ``zero`` from ``w``.

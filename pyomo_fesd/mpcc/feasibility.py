@@ -12,13 +12,11 @@ Leaves: an NLP built when it is first needed.
 import casadi as ca
 import numpy as np
 
-from pyomo_fesd.mpcc.nlp import Nlp
-
 
 class Feasibility:
     """The feasibility phase of one MPCC."""
 
-    def __init__(self, c, sides, options, deadline):
+    def __init__(self, c, sides, make):
         self._c = c
         eps = ca.SX.sym('eps')
         rows = ca.vertcat(c.g, sides.rows, c.G * c.H - eps)
@@ -31,7 +29,7 @@ class Feasibility:
         self._lbg, self._ubg, self._parts = lbg, ubg, len(up) + len(down)
         self._up, self._down = up, down
         self._rows = ca.Function('rows', [c.x, ca.vertcat(eps, c.p)], [ca.vertcat(c.g, sides.rows, c.G * c.H - eps)])
-        self._nlp = Nlp('feasibility', ca.vertcat(c.x, p, n), ca.vertcat(eps, c.p), ca.sum1(p) + ca.sum1(n), rows, options, deadline)
+        self._nlp = make('feasibility', ca.vertcat(c.x, p, n), ca.vertcat(eps, c.p), ca.sum1(p) + ca.sum1(n), rows)
 
     def solve(self, w, eps):
         """Solve from ``w``; the result's ``f`` is the sum of violations that remains, its ``w`` the point."""

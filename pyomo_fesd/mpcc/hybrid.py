@@ -10,6 +10,7 @@ from collections import Counter
 import numpy as np
 
 from pyomo_fesd.mpcc.active_set import active_sets
+from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.gap import GapTest
 from pyomo_fesd.mpcc.recovery import LADDER
 from pyomo_fesd.mpcc.run import Outcome, Point, Run, Stop, Tolerances
@@ -44,8 +45,7 @@ class HybridSolver:
     timer : HierarchicalTimer
     show : callable Step -> None
         called after each NLP and LPEC
-    deadline : float or None
-        value of ``time.perf_counter()`` at which to stop
+    deadline : Deadline, optional
     """
 
     def __init__(self, compiled, options, timer, show, deadline=None):
@@ -54,7 +54,7 @@ class HybridSolver:
             options.feasibility_tol, options.biactive_tol, options.descent_tol, options.eta_tol, options.trust_radius
         )
         self.run = Run()
-        self._steps = Steps(compiled, options, self._tolerances, self.run, timer, show, deadline)
+        self._steps = Steps(compiled, options, self._tolerances, self.run, timer, show, deadline or Deadline())
         self._forms = (options.relaxation,) if options.relaxation != 'auto' else AUTO[compiled.has_objective]
         self._gap = GapTest(options.gap_tol * 1e-2, options.gap_tol)
         self._tried = Counter()

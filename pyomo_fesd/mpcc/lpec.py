@@ -12,7 +12,6 @@ Where multipliers are at hand, weak duality is asked first: if it shows that eve
 branch does, and HiGHS is not called.
 """
 
-import time
 from dataclasses import dataclass
 
 import highspy
@@ -20,6 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from pyomo_fesd.mpcc.active_set import G_ZERO, H_ZERO
+from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.duality import lower_bound
 
 #: HiGHS' own 1e-7 is too coarse: a step's value is compared with 1e-6.  Its presolve calls some LPECs infeasible although d = 0
@@ -80,12 +80,12 @@ class Lpec:
     sides : Sides
     options : dict
         HiGHS options, passed through
-    deadline : float or None
-        value of ``time.perf_counter()`` at which HiGHS is to stop
+    deadline : Deadline, optional
+        at which HiGHS is to stop
     """
 
     def __init__(self, compiled, sides, options, deadline=None):
-        self._c, self._sides, self._options, self._deadline = compiled, sides, options, deadline
+        self._c, self._sides, self._options, self._deadline = compiled, sides, options, deadline or Deadline()
 
     def solve(self, w, sets, Delta, equal=None, beyond=False, multipliers=None, small=None, limits=None):
         """Solve the LPEC at ``w`` with active sets ``sets``, trust region ``Delta`` and the decisions ``equal`` imposed.
@@ -198,8 +198,8 @@ class Lpec:
                 settings.pop('solver', None)
                 if target is not None:
                     settings['objective_target'] = target
-            if self._deadline is not None:
-                settings['time_limit'] = max(0.0, self._deadline - time.perf_counter())
+            if self._deadline.at is not None:
+                settings['time_limit'] = self._deadline.left()
             settings |= dict.fromkeys(TOLERANCES, attempt['tolerance']) | limits | self._options
             for name, option in settings.items():
                 highs.setOptionValue(name, option)

@@ -9,7 +9,7 @@ import signal
 import threading
 from abc import ABC, abstractmethod
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import casadi as ca
@@ -29,6 +29,10 @@ IPOPT = {
     'perturb_always_cd': 'yes',
     'print_level': 0,
     'sb': 'yes',
+}
+#: For a start with multipliers: neither they nor the point are pushed far from their bounds.
+IPOPT_WARM = {'warm_start_init_point': 'yes'} | {
+    f'warm_start_{name}': 1e-6 for name in ('bound_push', 'bound_frac', 'slack_bound_push', 'slack_bound_frac', 'mult_bound_push')
 }
 #: What the solvers say of a stationary, feasible point: Ipopt, Uno, and an executable in Pyomo's words.
 SOLVED = (
@@ -95,8 +99,7 @@ class NlpSolver(ABC):
     x, p, f, g : SX
     budget : dict
         our wishes, in Ipopt's names (``max_iter``, ``tol``, ``mu_init``, ...); each solver follows those that it has
-    deadline : float or None
-        value of ``time.perf_counter()`` at which to stop
+    deadline : Deadline, optional
     jacobian : SX, optional
         of g by x, where it is known more cheaply than casadi finds it (one dense column defeats its colouring)
     options : dict, optional
@@ -118,10 +121,17 @@ class NlpSolver(ABC):
         pass
 
     @abstractmethod
-    def solve(self, w0, p, lbx, ubx, lbg, ubg):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
         """Solve from ``w0``; never raises for an unsolved problem, the status says it.
 
         Infinite bounds are ``np.inf``; a row or variable with two of them is free, one with equal bounds is an equation or fixed.
+
+        Parameters
+        ----------
+        duals : NlpResult, optional
+            multipliers to start from, where the solver can use them
+        max_iter : int, optional
+            iterations that this call may use, where they can be counted
 
         Returns
         -------
@@ -231,9 +241,3 @@ def lagrangian_gradient(x, p, f, g):
     lam = ca.SX.sym('lam', g.numel())
     return ca.Function('gradient', [x, p, lam], [ca.densify(ca.gradient(f + ca.dot(lam, g), x))])
 
-
-def __getattr__(name):
-    # until all callers choose by ``nlp_solver``
-    if name == 'Nlp':
-        return nlp_solver('ipopt')
-    raise AttributeError(name)

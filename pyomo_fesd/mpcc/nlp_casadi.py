@@ -4,7 +4,6 @@ import ctypes
 import io
 import logging
 import os
-import time
 from abc import abstractmethod
 from contextlib import redirect_stderr
 from dataclasses import replace
@@ -14,7 +13,17 @@ import casadi as ca
 import numpy as np
 from pyomo.common.tee import capture_output
 
-from pyomo_fesd.mpcc.nlp import IPOPT, NlpResult, NlpSolver, check_options, interruptible, rows_with_variables, violated
+from pyomo_fesd.mpcc.deadline import Deadline
+from pyomo_fesd.mpcc.nlp import (
+    IPOPT,
+    IPOPT_WARM,
+    NlpResult,
+    NlpSolver,
+    check_options,
+    interruptible,
+    rows_with_variables,
+    violated,
+)
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -32,17 +41,21 @@ UNO_NAMES = {
 UNIFIED = {'SOLVER_RET_LIMITED': 'iteration or time limit', 'SOLVER_RET_NAN': 'error'}
 #: Ends of the tiny problem on which options are tried that only these can have caused.
 REFUSED = ('Invalid_Option', 'error')
+#: casadi's options for derivatives, and where an earlier solver has them.
+DERIVATIVES = {'grad_f': 'nlp_grad_f', 'jac_g': 'nlp_jac_g', 'hess_lag': 'nlp_hess_l'}
+#: Ipopt leaves its counter unset when it does not begin.
+NOT_BEGUN = ('Not_Enough_Degrees_Of_Freedom', 'Invalid_Problem_Definition', 'Invalid_Option')
 #: Uno's own numbers for the types of its options.
 UNO_TYPES = {0: int, 1: float, 2: bool, 3: str}
 
 
-class _Deadline(ca.Callback):
-    """Asks the solver to stop when the time is up."""
+class _Watch(ca.Callback):
+    """Asks the solver to stop when the time is up, or the iterations that a call may use."""
 
-    def __init__(self, n, m, p, until):
+    def __init__(self, n, m, p, deadline):
         super().__init__()
-        self._sizes, self._until = (n, m, p), until
-        self.construct('deadline', {})
+        self._sizes, self._deadline, self.left = (n, m, p), deadline, np.inf
+        self.construct('watch', {})
 
     def get_n_in(self):
         return ca.nlpsol_n_out()
@@ -56,7 +69,8 @@ class _Deadline(ca.Callback):
         return ca.Sparsity.dense(length, 1)
 
     def eval(self, arg):
-        return [float(time.perf_counter() > self._until)]
+        self.left -= 1
+        return [float(self.left < 0 or self._deadline.expired())]
 
 
 class _CasadiNlp(NlpSolver):
@@ -76,10 +90,9 @@ class _CasadiNlp(NlpSolver):
         settings = {'print_time': False, self.PLUGIN: self._settings(budget, options)}
         if jacobian is not None and self.TAKES_JACOBIAN:
             settings['jac_g'] = ca.Function('nlp_jac_g', [x, p], [g, jacobian], ['x', 'p'], ['g', 'jac_g_x'])
-        if deadline is not None:
-            self._deadline = _Deadline(x.numel(), g.numel(), p.numel(), deadline)
-            settings['iteration_callback'] = self._deadline
-        self._solver = ca.nlpsol(name, self.PLUGIN, {'x': x, 'p': p, 'f': f, 'g': g}, settings)
+        self._watch = settings['iteration_callback'] = _Watch(x.numel(), g.numel(), p.numel(), deadline or Deadline())
+        self._make = lambda more: ca.nlpsol(name, self.PLUGIN, {'x': x, 'p': p, 'f': f, 'g': g}, settings | more)
+        self._solver = self._make({})
 
     @abstractmethod
     def _settings(self, budget, options):
@@ -101,21 +114,28 @@ class _CasadiNlp(NlpSolver):
                 return f'{said.getvalue()} {str(error).splitlines()[-1]}'
         return "invalid value" if self._status(solver.stats()) in REFUSED else None
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg):
+    def _solver_for(self, duals):
+        """The solver for a start without or with multipliers."""
+        return self._solver
+
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
         """Solve from ``w0``; see ``NlpSolver``."""
         said = io.StringIO()
+        solver = self._solver_for(duals)
+        self._watch.left = np.inf if max_iter is None else max_iter
+        start = {} if duals is None else {'lam_x0': duals.lam_x, 'lam_g0': duals.lam_g}
         with redirect_stderr(said), interruptible():
             try:
-                result = self._solver(x0=w0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
+                result = solver(x0=w0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg, **start)
             except RuntimeError as error:
                 if 'An exception was raised in the solver' not in str(error):
                     raise
                 return self._failed(w0, p, len(lbg))
         if said.getvalue():
             logger.debug("casadi: %s", said.getvalue())
-        stats = self._solver.stats()
+        stats = solver.stats()
         w, lam_g, lam_x = (np.asarray(result[key], dtype=float).ravel() for key in ('x', 'lam_g', 'lam_x'))
-        return NlpResult(w, float(result['f']), self._status(stats), int(stats['iter_count']), lam_g, lam_x)
+        return NlpResult(w, float(result['f']), self._status(stats), _iterations(stats), lam_g, lam_x)
 
     def _failed(self, w0, p, m, status='error'):
         """The result where the solver gives no point."""
@@ -129,8 +149,20 @@ class CasadiIpopt(_CasadiNlp):
 
     PLUGIN, SILENT, TAKES_JACOBIAN = 'ipopt', {'print_level': 0, 'sb': 'yes'}, True
 
+    def __init__(self, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
+        super().__init__(name, x, p, f, g, budget, deadline, jacobian, options)
+        self._warm, self._warm_settings = None, IPOPT | budget | IPOPT_WARM | (options or {})
+
     def _settings(self, budget, options):
         return IPOPT | budget | options
+
+    def _solver_for(self, duals):
+        if duals is None:
+            return self._solver
+        if self._warm is None:
+            derivatives = {option: self._solver.get_function(function) for option, function in DERIVATIVES.items()}
+            self._warm = self._make(derivatives | {'ipopt': self._warm_settings})
+        return self._warm
 
 
 class CasadiUno(_CasadiNlp):
@@ -151,13 +183,15 @@ class CasadiUno(_CasadiNlp):
         self._varying, self._g = rows_with_variables(g, x), ca.Function('g', [x, p], [ca.densify(g)])
         super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, jacobian, options)
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
         """Solve from ``w0``; see ``NlpSolver``."""
         varying = self._varying
         g, lam_g = self._g(w0, p).full().ravel(), np.zeros(len(varying))
         if np.any(violated(g, lbg, ubg) & ~varying):
             return self._failed(w0, p, len(varying), 'infeasible')
-        result = super().solve(w0, p, lbx, ubx, lbg[varying], ubg[varying])
+        if duals is not None:
+            duals = replace(duals, lam_g=duals.lam_g[varying])
+        result = super().solve(w0, p, lbx, ubx, lbg[varying], ubg[varying], duals, max_iter)
         lam_g[varying] = result.lam_g
         return replace(result, lam_g=lam_g)
 
@@ -169,6 +203,10 @@ class CasadiUno(_CasadiNlp):
 
     def _status(self, stats):
         return UNIFIED.get(stats['unified_return_status'], stats['return_status'])
+
+
+def _iterations(stats):
+    return int(stats['iter_count']) if stats['return_status'] not in NOT_BEGUN else 0
 
 
 def _uno_type(name):

@@ -1,7 +1,6 @@
 """The system's Ipopt through cyipopt, with casadi's functions and exact derivatives."""
 
 import io
-import time
 from functools import cache
 
 import casadi as ca
@@ -9,8 +8,10 @@ import cyipopt
 import numpy as np
 from pyomo.common.tee import capture_output
 
+from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.nlp import (
     IPOPT,
+    IPOPT_WARM,
     NlpResult,
     NlpSolver,
     accepted,
@@ -83,7 +84,7 @@ class _Callbacks:
 
     def intermediate(self, mode, iteration, *args):
         self.iterations = iteration
-        return self._deadline is None or time.perf_counter() <= self._deadline
+        return not self._deadline.expired()
 
 
 class CyIpopt(NlpSolver):
@@ -100,21 +101,27 @@ class CyIpopt(NlpSolver):
             'jacobian': ca.Function('jacobian', [x, p], [jacobian.nz[:]]),
             'hessian': ca.Function('hessian', [x, p, lam, weight], [hessian.nz[:]]),
         }
-        self._callbacks = _Callbacks(functions, _places(jacobian), _places(hessian), deadline)
+        self._callbacks = _Callbacks(functions, _places(jacobian), _places(hessian), deadline or Deadline())
         self._f, self._lagrangian = functions['f'], lagrangian_gradient(x, p, f, g)
         options = options or {}
         check_options('cyipopt', options, _complaint)
         self._options = _accepted(tuple((IPOPT | budget).items())) | options
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
         """Solve from ``w0``; see ``NlpSolver``."""
         called = self._callbacks
         called.p, called.iterations = p, 0
         problem = cyipopt.Problem(n=len(lbx), m=len(lbg), problem_obj=called, lb=lbx, ub=ubx, cl=lbg, cu=ubg)
-        for key, value in self._options.items():
+        settings, start = dict(self._options), {}
+        if duals is not None:
+            settings |= _accepted(tuple(IPOPT_WARM.items()))
+            start = {'lagrange': duals.lam_g, 'zl': np.maximum(-duals.lam_x, 0.0), 'zu': np.maximum(duals.lam_x, 0.0)}
+        if max_iter is not None:
+            settings['max_iter'] = max_iter
+        for key, value in settings.items():
             problem.add_option(key, value)
         with interruptible():
-            w, info = problem.solve(np.array(w0, dtype=float))
+            w, info = problem.solve(np.array(w0, dtype=float), **start)
         problem.close()
         # older Ipopts give no multipliers to fixed variables, casadi's does
         lam_x = bound_multipliers(self._lagrangian(w, p, info['mult_g']).full().ravel(), lbx, ubx)

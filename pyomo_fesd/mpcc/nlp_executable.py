@@ -11,7 +11,6 @@ import operator
 import os
 import re
 import subprocess
-import time
 from functools import cache, partial
 
 import casadi as ca
@@ -24,6 +23,7 @@ from pyomo.opt import ProblemFormat
 from pyomo.opt.base.solvers import UnknownSolver
 
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.nlp import (
     IPOPT,
     NlpResult,
@@ -97,7 +97,7 @@ class Executable(NlpSolver):
         check_options(solver, options, partial(_complaint, solver))
         wishes = {key: value for key, value in (IPOPT | budget).items() if key not in ('print_level', 'sb')}
         self._options = (_accepted(solver, tuple(wishes.items())) if _like_ipopt(solver) else {}) | options
-        self._solver, self._deadline, self._limits_itself = solver, deadline, _like_ipopt(solver)
+        self._solver, self._deadline, self._limits_itself = solver, deadline or Deadline(), _like_ipopt(solver)
         self._model = _to_pyomo(x, p, f, g)
         self._constant = ~rows_with_variables(g, x)
         self._values, self._lagrangian = ca.Function('values', [x, p], [f, g]), lagrangian_gradient(x, p, f, g)
@@ -114,16 +114,16 @@ class Executable(NlpSolver):
             reads_nl = hasattr(solver, 'problem_format') and solver.problem_format() == ProblemFormat.nl
         return None if reads_nl else "Pyomo's solver of this name reads no NL files"
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg):
-        """Solve from ``w0``; see ``NlpSolver``."""
-        left = None if self._deadline is None else self._deadline - time.perf_counter()
-        if left is not None and left <= 0:
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
+        """Solve from ``w0``; see ``NlpSolver``.  Multipliers to start from are not used."""
+        left = self._deadline.left()
+        if left == 0.0:
             return self._result(w0, p, lbx, ubx, OUT_OF_TIME)
         g = self._values(w0, p)[1].full().ravel()
         if np.any(violated(g, lbg, ubg) & self._constant):
             return self._result(w0, p, lbx, ubx, 'infeasible')
         self._set(np.clip(w0, lbx, ubx), p, lbx, ubx, lbg, ubg)
-        status, iterations, found = self._run(left)
+        status, iterations, found = self._run(left, max_iter)
         if not found:
             return self._result(w0, p, lbx, ubx, status, iterations)
         m = self._model
@@ -143,11 +143,13 @@ class Executable(NlpSolver):
         m.upper.store_values(dict(enumerate(np.asarray(ubg, dtype=float).tolist())))
         m.dual.clear()
 
-    def _run(self, left):
+    def _run(self, left, max_iter):
         """Run the executable on the model; its status, its iterations, and whether it has left a point on the model."""
         options = dict(self._options)
         if left is not None and self._limits_itself:
             options.setdefault('max_cpu_time', left)
+        if max_iter is not None and self._limits_itself:
+            options['max_iter'] = max_iter
         said = io.StringIO()
         # a solver stopped half-way leaves its context on the stack of temporary files, which this one clears with a warning
         with LoggingIntercept(said, 'pyomo'), TempfileManager:

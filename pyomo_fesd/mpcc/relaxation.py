@@ -11,8 +11,6 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
-from pyomo_fesd.mpcc.nlp import Nlp
-
 
 @dataclass
 class Terms:
@@ -86,7 +84,7 @@ ROOM = 1e-2
 class Relaxation:
     """One form for one MPCC."""
 
-    def __init__(self, c, sides, form, options, deadline):
+    def __init__(self, c, sides, form, make):
         eps = ca.SX.sym('eps')
         terms = form(c.G, c.H, eps)
         self._c, self._slack = c, int(terms.slack is not None)
@@ -99,7 +97,7 @@ class Relaxation:
             # the slack's column is dense, which would defeat casadi's colouring
             w = ca.vertcat(c.x, terms.slack)
             jacobian = ca.horzcat(ca.jacobian(rows, c.x), ca.jacobian(rows, terms.slack))
-        self._nlp = Nlp(form.__name__, w, ca.vertcat(eps, c.p), c.f + c.penalty + terms.cost, rows, options, deadline, jacobian=jacobian)
+        self._nlp = make(form.__name__, w, ca.vertcat(eps, c.p), c.f + c.penalty + terms.cost, rows, jacobian=jacobian)
 
     def solve(self, w, eps, duals=None):
         """Solve from ``w``, with the multipliers of an earlier result of this form if given."""
@@ -122,8 +120,8 @@ class Penalty(Relaxation):
     #: rho at the start and its growth.
     START, GROWTH, LIMIT = 1.0, 10.0, 1e12
 
-    def __init__(self, c, sides, form, options, deadline):
-        super().__init__(c, sides, form, options, deadline)
+    def __init__(self, c, sides, form, make):
+        super().__init__(c, sides, form, make)
         self._rho = self.START
 
     def solve(self, w, eps, duals=None):
@@ -139,6 +137,6 @@ class Penalty(Relaxation):
             w, duals = result.w, result
 
 
-#: option ``relaxation`` -> how it is built from a compiled MPCC, its sides, Ipopt's options and a deadline
+#: option ``relaxation`` -> how it is built from a compiled MPCC, its its sides and what makes an NLP
 FORMS = (scholtes, scholtes_equality, lin_fukushima, kanzow_schwartz, steffensen_ulbrich, fischer_burmeister, l1, elastic)
 RELAXATIONS = {form.__name__: (Relaxation, form) for form in FORMS} | {'penalty': (Penalty, l1)}

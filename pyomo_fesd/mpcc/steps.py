@@ -2,12 +2,14 @@
 
 import time
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 
 from pyomo_fesd.mpcc.branch import Branch
 from pyomo_fesd.mpcc.feasibility import Feasibility
 from pyomo_fesd.mpcc.lpec import Lpec
+from pyomo_fesd.mpcc.nlp import nlp_solver
 from pyomo_fesd.mpcc.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.run import Outcome, Step, Stop
 from pyomo_fesd.mpcc.sides import sort_sides
@@ -31,8 +33,7 @@ class Steps:
     timer : HierarchicalTimer
     show : callable Step -> None
         called after each NLP and LPEC
-    deadline : float or None
-        value of ``time.perf_counter()`` at which to stop
+    deadline : Deadline
     """
 
     def __init__(self, compiled, options, tolerances, run, timer, show, deadline):
@@ -40,29 +41,25 @@ class Steps:
         self._timer, self._show, self._deadline = timer, show, deadline
         with self._timed('build'):
             self._sides = sort_sides(compiled)
-        self._built = {}
+        self._built, self._solver = {}, nlp_solver(options.nlp_solver)
         self._lpec = Lpec(compiled, self._sides, options.lpec_options.value(), deadline)
 
     # what the algorithm calls
 
     def relax(self, form, w, eps, duals):
         """Reg(eps) in a form of ``RELAXATIONS``, from ``w`` and perhaps a result of the same form."""
-        kind, rows = RELAXATIONS[form]
-        nlp = self._build(form, lambda ipopt: kind(self._c, self._sides, rows, ipopt, self._deadline), **self._budget('relaxation'))
+        kind, terms = RELAXATIONS[form]
+        nlp = self._build(form, lambda make: kind(self._c, self._sides, terms, make), 'relaxation')
         return self._nlp('relaxation', eps, lambda: nlp.solve(w, eps, duals))
 
     def restore(self, w, eps):
         """The feasibility phase."""
-        nlp = self._build(
-            'feasibility', lambda ipopt: Feasibility(self._c, self._sides, ipopt, self._deadline), **self._budget('relaxation')
-        )
+        nlp = self._build('feasibility', lambda make: Feasibility(self._c, self._sides, make), 'relaxation')
         return self._nlp('restoration', eps, lambda: nlp.solve(w, eps))
 
     def branch(self, w, zero, equal, weight, **more):
         """A branch NLP; None if it contradicts the bounds or ends nowhere."""
-        nlp = self._build(
-            'branch', lambda ipopt: Branch(self._c, self._sides, ipopt, self._deadline), **self._budget('branch')
-        )
+        nlp = self._build('branch', lambda make: Branch(self._c, self._sides, make), 'branch')
         result = self._nlp('branch', 0.0, lambda: nlp.solve(w, zero, equal, weight, **more))
         return result if result is not None and self.usable(result) else None
 
@@ -102,15 +99,17 @@ class Steps:
 
     # how they run
 
-    def _budget(self, kind):
-        options = self._options
-        return {'max_iter': getattr(options, f'{kind}_iterations'), 'tol': getattr(options, f'{kind}_tol')}
-
-    def _build(self, name, make, **budget):
+    def _build(self, name, construct, kind):
         if name not in self._built:
             with self._timed('build'):
-                self._built[name] = make(budget | self._options.nlp_options.value())
+                self._built[name] = construct(partial(self._make, kind))
         return self._built[name]
+
+    def _make(self, kind, name, x, p, f, g, budget=None, jacobian=None):
+        """An NLP solver of the user's choice, with the limits that its kind has."""
+        options = self._options
+        ours = {'max_iter': getattr(options, f'{kind}_iterations'), 'tol': getattr(options, f'{kind}_tol')} | (budget or {})
+        return self._solver(name, x, p, f, g, ours, self._deadline, jacobian, options.nlp_options.value())
 
     def _nlp(self, kind, eps, solve):
         with self._timed(kind) as started:
@@ -132,7 +131,7 @@ class Steps:
             self._timer.stop(kind)
 
     def _check_limits(self):
-        if self._deadline is not None and time.perf_counter() > self._deadline:
+        if self._deadline.expired():
             raise Stop(Outcome.TIME_LIMIT)
         if self.run.counts.iterations >= self._options.max_iterations:
             raise Stop(Outcome.ITERATION_LIMIT)

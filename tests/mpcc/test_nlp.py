@@ -10,6 +10,7 @@ import pytest
 
 from pyomo_fesd import FesdError
 from pyomo_fesd.mpcc import nlp
+from pyomo_fesd.mpcc.deadline import Deadline
 
 SOLVERS = ['ipopt', 'uno', 'cyipopt', 'pounce']
 #: The limit of iterations in each solver's own words.
@@ -136,10 +137,10 @@ def test_refused_option_is_an_error_that_names_it(solver, option, setting):
 
 
 def test_deadline_ends_the_solve(solver):
-    result = valley(solver, budget={'max_iter': 1000}, deadline=time.perf_counter() - 1)
+    result = valley(solver, budget={'max_iter': 1000}, deadline=Deadline(time.perf_counter() - 1))
     assert not result.solved
     assert result.iterations <= 1
-    assert valley(solver, budget={'max_iter': 1000}, deadline=time.perf_counter() + 60).solved
+    assert valley(solver, budget={'max_iter': 1000}, deadline=Deadline(time.perf_counter() + 60)).solved
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 
 from pyomo_fesd import FesdError
 from pyomo_fesd.mpcc import nlp
+from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.nlp_executable import _to_pyomo
 
 x, p = ca.SX.sym('x', 2), ca.SX.sym('p')
@@ -60,7 +61,7 @@ def test_executable_by_its_path_takes_options_of_ipopt_if_it_is_called_so(tmp_pa
 
 def test_executable_that_does_not_stop_is_stopped(tmp_path):
     started = time.perf_counter()
-    result = solve(script(tmp_path, 'exec sleep 60'), deadline=started + 0.2)
+    result = solve(script(tmp_path, 'exec sleep 60'), deadline=Deadline(started + 0.2))
     assert time.perf_counter() < started + 30
     assert (result.status, list(result.w)) == ('time limit', [0.4, 0.6])
 
