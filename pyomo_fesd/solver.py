@@ -76,19 +76,19 @@ class MpecHybridConfig(SolverConfig):
                 'relaxation',
                 'auto',
                 In(['auto', *RELAXATIONS]),
-                "form of Reg(eps): 'elastic' (one slack, weight 1/eps), 'scholtes' (products <= eps), or 'auto': elastic without an "
-                "objective, scholtes with one, the other after a failure",
+                "form of Reg(eps): 'elastic' (one slack, weight 1/eps), 'scholtes' (products <= eps), others of the same kind, or "
+                "'auto': elastic without an objective, scholtes with one, the other after a failure",
             ),
             (
                 'nlp_solver',
                 'ipopt',
                 str,
-                "NLP solver: 'ipopt' (the one in casadi's wheel), 'uno' (also there), 'cyipopt' (the system's Ipopt), or an executable "
-                "that reads NL files and that Pyomo knows, e.g. 'pounce', 'asl:ipopt'",
+                "NLP solver: 'ipopt' (the one in casadi's wheel), 'uno' (also there), 'cyipopt' (the system's Ipopt), or an "
+                "executable that reads NL files and that Pyomo knows, e.g. 'pounce', 'asl:ipopt'",
             ),
             ('relaxation_tol', 1e-4, PositiveFloat, "Ipopt's tol for relaxations, which only lead to a branch"),
             ('relaxation_iterations', 500, PositiveInt, "Ipopt iterations allowed to one relaxation"),
-            ('gap_tol', 5e-5, PositiveFloat, "gap test: relative distance of the incumbent to the relaxed objective that ends the run"),
+            ('gap_tol', 5e-5, PositiveFloat, "gap test: relative distance of incumbent and relaxed objective that ends a run"),
             ('feasibility_tol', 1e-6, PositiveFloat, "largest scaled violation and complementarity of a reported point"),
             ('biactive_tol', 1e-6, PositiveFloat, "sides below this are both zero at a branch solution (eq. 16)"),
             ('descent_tol', 1e-6, PositiveFloat, "LPEC value, relative to max(1, |f|), that counts as no descent"),
@@ -131,13 +131,17 @@ class _Loader(SolutionLoader):
         """Multipliers of the constraints in the branch NLP, in Pyomo's sign; the pairs are fixed there."""
         if self._nlp is None:
             raise NoDualsError()
-        return _select(dict, self._c.constraints, -self._c.sign * self._nlp.lam_g[: len(self._c.constraints)] * self._c.scale.g / self._c.scale.f, cons_to_load)
+        c = self._c
+        lam = -c.sign * self._nlp.lam_g[: len(c.constraints)] * c.scale.g / c.scale.f
+        return _select(dict, c.constraints, lam, cons_to_load)
 
     def get_reduced_costs(self, vars_to_load=None):
         """Multipliers of the bounds in the branch NLP, in Pyomo's sign."""
         if self._nlp is None:
             raise NoReducedCostsError()
-        return _select(ComponentMap, self._c.variables, -self._c.sign * self._nlp.lam_x * self._c.scale.x / self._c.scale.f, vars_to_load)
+        c = self._c
+        lam = -c.sign * self._nlp.lam_x * c.scale.x / c.scale.f
+        return _select(ComponentMap, c.variables, lam, vars_to_load)
 
     def load_vars(self, vars_to_load=None):
         super().load_vars(vars_to_load)

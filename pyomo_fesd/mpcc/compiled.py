@@ -1,6 +1,7 @@
 """The MPCC as numbers and functions: what relaxations, branches and the LPEC are formed from.
 
-Everything here is in the solver's own scaling (see ``scaling``); ``values``, ``objective`` and ``absolute`` lead back to the model's.
+Everything here is in the solver's own scaling (see ``scaling``); ``values``, ``objective`` and ``absolute`` lead back to that of
+the model.
 A ``Compiled`` can be pickled and sent to another process: the casadi graph goes along, the Pyomo components do not.
 """
 

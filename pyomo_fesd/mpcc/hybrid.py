@@ -27,6 +27,8 @@ EXHAUSTED = 1e-8
 SHRINK, SHRINKS = 0.1, 3
 #: A feasible point with variables beyond this has run away along an unbounded objective.
 UNBOUNDED = 1e15
+#: Trust region of the LPEC that looks for any feasible branch.
+FAR = 1e3
 #: Branch-and-bound nodes for an LPEC that only suggests a branch.
 SUGGESTION = {'mip_max_nodes': 100}
 #: Without an objective any solution will do, and the elastic form is by far the quickest to one; with an objective it settles
@@ -98,7 +100,8 @@ class HybridSolver:
                     return
                 step = ladder.pop(0)
                 self._steps.note(step.what, relaxed.w)
-                w, eps = step.start(self._c.x0, relaxed.w, self), max(step.eps(options.eps_init, eps, options.eps_factor), options.eps_final)
+                w = step.start(self._c.x0, relaxed.w, self)
+                eps = max(step.eps(options.eps_init, eps, options.eps_factor), options.eps_final)
                 form, duals, previous = (form + step.other_form) % len(self._forms), None, None
                 self._gap.restart()
                 continue
@@ -137,12 +140,20 @@ class HybridSolver:
         return point is not None and point.certificate.certified and self._gap.closed(point.f)
 
     def _last_resort(self):
-        """Nothing feasible: the feasibility phase shows what contradicts, or a point to start one more branch from."""
-        nearest = self._steps.restore(self.run.w, self._options.eps_final)
-        self.run.w = nearest.w
-        at = self._c.evaluate(nearest.w)
+        """Nothing feasible: the LPEC with every pair as a binary names the branch whose linearisation is feasible, if there is one.
+
+        Otherwise the feasibility phase shows what contradicts.
+        """
         self._tried.clear()
-        self._explore(None, active_sets(at.G, at.H, self._steps.biactive(at)), True)
+        for w in (self.run.w, self._c.x0):
+            sets = active_sets(*self._sides(w), np.inf)
+            step = self._steps.lpec(w, sets, FAR, limits=SUGGESTION)
+            if step.solved:
+                self._improve_from(self._point(w + step.d, step.zero, None, True))
+            if self.run.point is not None:
+                return
+        self.run.w = self._steps.restore(self.run.w, self._options.eps_final).w
+        self._explore(None, active_sets(*self._sides(self.run.w), self._tolerances.biactive), True)
 
     # branches
 
@@ -151,7 +162,10 @@ class HybridSolver:
         zero, w = sets.zero, self.run.w if relaxed is None else relaxed.w
         if sets.gamma.any() and self._c.has_objective and self._tried[zero.tobytes()] < TRIES:
             zero = self._steps.lpec(w, sets, self._tolerances.radius, limits=SUGGESTION).zero
-        point = self._point(w, zero, relaxed, final)
+        self._improve_from(self._point(w, zero, relaxed, final))
+
+    def _improve_from(self, point):
+        """Keep ``point`` and what descends from it."""
         while point is not None:
             self._keep(point)
             point = self._descend(point) if point.certificate.grade is Stationarity.DESCENT else None
@@ -206,11 +220,11 @@ class HybridSolver:
         solved, equal = self._solve_branch(w, zero, duals, **more)
         if solved is None:
             return None
+        if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
+            raise Stop(Outcome.UNBOUNDED)
         certificate = self._steps.certify(solved, equal)
         if not certificate.feasible:
             return None
-        if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
-            raise Stop(Outcome.UNBOUNDED)
         return Point(solved, self._c.evaluate(solved.w).f, certificate, equal)
 
     def _solve_branch(self, w, zero, duals, **more):

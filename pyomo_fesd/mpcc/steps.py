@@ -18,6 +18,9 @@ from pyomo_fesd.mpcc.stationarity import certify
 #: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
 BIACTIVE = 3.0
 
+#: What NLP solvers say of a problem that they found infeasible: the model's own rows may hold there, the pairs do not.
+INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
+
 
 class Steps:
     """The NLPs and LPECs of one compiled MPCC, built when they are first needed.
@@ -39,8 +42,9 @@ class Steps:
     def __init__(self, compiled, options, tolerances, run, timer, show, deadline):
         self._c, self._options, self._tolerances, self.run = compiled, options, tolerances, run
         self._timer, self._show, self._deadline = timer, show, deadline
-        with self._timed('build'):
-            self._sides = sort_sides(compiled)
+        timer.start('build')
+        self._sides = sort_sides(compiled)
+        timer.stop('build')
         self._built, self._solver = {}, nlp_solver(options.nlp_solver)
         self._lpec = Lpec(compiled, self._sides, options.lpec_options.value(), deadline)
 
@@ -85,8 +89,8 @@ class Steps:
         self._log('recovery', 0.0, w, 0, what, time.perf_counter())
 
     def usable(self, result):
-        """Whether an NLP's point can lead on: solved, or stopped where its constraints hold."""
-        return result.solved or self.violation(result.w) <= self._tolerances.feasibility
+        """Whether an NLP's point can lead on: solved, or stopped where the model's constraints hold, but not as infeasible."""
+        return result.solved or (result.status not in INFEASIBLE and self.violation(result.w) <= self._tolerances.feasibility)
 
     def violation(self, w):
         """The largest violation of rows and bounds."""

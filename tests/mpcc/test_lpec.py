@@ -10,13 +10,14 @@ from pyomo.mpec import Complementarity, complements
 from pyomo_fesd.mpcc.active_set import G_ZERO, H_ZERO, active_sets
 from pyomo_fesd.mpcc.compile import compile_problem
 from pyomo_fesd.mpcc.lpec import Lpec
+from pyomo_fesd.mpcc.sides import sort_sides
 from pyomo_fesd.mpcc.problem import read_problem
 
 
 def lpec_at(model, w, tolerance=1e-6, Delta=1.0):
     c = compile_problem(read_problem(model), HierarchicalTimer())
     at = c.evaluate(np.array(w))
-    return Lpec(c, {}).solve(np.array(w), active_sets(at.G, at.H, tolerance), Delta)
+    return Lpec(c, sort_sides(c), {}).solve(np.array(w), active_sets(at.G, at.H, tolerance), Delta)
 
 
 def test_at_the_origin_of_the_toy_one_axis_is_taken_and_the_other_side_stays_zero():
