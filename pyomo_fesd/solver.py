@@ -34,7 +34,7 @@ from pyomo.core.staleflag import StaleFlagManager
 
 from pyomo_fesd import marks
 from pyomo_fesd.errors import FesdError
-from pyomo_fesd.mpcc.compile import compile_problem
+from pyomo_fesd.mpcc.compile import Contradiction, compile_problem
 from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.hybrid import HybridSolver
 from pyomo_fesd.mpcc.lpec import Lpec
@@ -99,6 +99,9 @@ class MpecHybridConfig(SolverConfig):
             ('max_iterations', 20000, PositiveInt, "Ipopt iterations allowed in all"),
         ):
             setattr(self, name, self.declare(name, ConfigValue(default=default, domain=domain, description=text)))
+        self.user_scaling = self.declare(
+            'user_scaling', ConfigValue(default=True, domain=bool, description="honour Pyomo's scaling_factor suffixes")
+        )
         self.nlp_options = self.declare(
             'nlp_options', ConfigDict(implicit=True, description="options passed to Ipopt, e.g. {'max_iter': 3000}")
         )
@@ -205,8 +208,13 @@ class MpecHybrid(SolverBase):
         StaleFlagManager.mark_all_as_stale()
         problem = read_problem(model)
         timer.start('compile')
-        with PauseGC():
-            compiled = compile_problem(problem, timer, config.working_dir)
+        try:
+            with PauseGC():
+                compiled = compile_problem(problem, timer, config.working_dir, user_scaling=config.user_scaling)
+        except Contradiction as error:
+            _fill_contradiction(results, str(error))
+            results.solver_config = config
+            return self._deliver(results, config)
         timer.stop('compile')
         table = Table(config.tee, compiled)
         deadline = Deadline(None if config.time_limit is None else started + config.time_limit)
@@ -269,6 +277,30 @@ def _fill(results, model, c, run):
     if info.violated:
         info.reason = 'largest violations: ' + ', '.join(f'{name} ({amount:.1e})' for name, amount in info.violated)
     info.steps = run.steps
+
+
+def _fill_contradiction(results, message):
+    """Pyomo's results where fixed values alone violate a constraint: nothing was solved."""
+    results.termination_condition, results.solution_status = CONDITIONS[Outcome.INFEASIBLE]
+    results.solution_loader = _Nothing()
+    info = results.extra_info
+    info.outcome, info.stationarity, info.reason = Outcome.INFEASIBLE.value, 'not certified', message
+    info.violated, info.steps = [], []
+    for name in ('violation', 'complementarity', 'violation_scaled', 'complementarity_scaled', 'biactive_pairs', 'eps_last'):
+        setattr(info, name, None)
+    info.nlps = info.nlp_iterations = info.lpecs = info.binaries = 0
+
+
+class _Nothing(SolutionLoader):
+    """No point at all."""
+
+    def get_number_of_solutions(self):
+        """0."""
+        return 0
+
+    def get_vars(self, vars_to_load=None):
+        """There are none."""
+        raise NoSolutionError()
 
 
 def _status_of(run):

@@ -243,3 +243,43 @@ def test_conditions_as_people_write_them(condition):
     m.c = Complementarity(expr=condition(m))
     pyo.SolverFactory('mpec_hybrid').solve(m)
     assert sorted((round(m.x.value, 6), round(m.y.value, 6))) == [0, 1]
+
+
+def test_fixed_values_that_violate_a_constraint_are_called_infeasible_by_name():
+    m = small_mpccs.pair(1.0, 1.0)
+    m.f = pyo.Objective(expr=m.x)
+    m.z = pyo.Var(initialize=1)
+    m.z.fix()
+    m.k = pyo.Constraint(expr=m.z >= 2)
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, load_solutions=False)
+    assert results.solver.termination_condition == pyo.TerminationCondition.infeasible
+    assert "'k'" in results.solver.reason
+
+
+@pytest.mark.parametrize('start', [None, -1.0, 1.0])
+def test_a_variable_that_stands_only_in_a_pair_is_free(start):
+    m = pyo.ConcreteModel()
+    m.x, m.y = pyo.Var(initialize=2), pyo.Var(initialize=start)
+    m.c = Complementarity(expr=complements(m.x >= 0, m.y >= 0))
+    m.f = pyo.Objective(expr=(m.x - 1) ** 2)
+    results = pyo.SolverFactory('mpec_hybrid').solve(m)
+    assert results.solver.stationarity == 'B'
+    assert (m.x.value, m.y.value) == pytest.approx((1, 0))
+
+
+def test_scaling_factors_change_neither_the_answer_nor_its_units():
+    answers = []
+    for factor in (None, 1e3):
+        m = pyo.ConcreteModel()
+        m.x, m.y = pyo.Var(initialize=1, bounds=(0, None)), pyo.Var(initialize=1, bounds=(0, None))
+        m.k = pyo.Constraint(expr=m.x + m.y >= 0.5)
+        m.c = Complementarity(expr=complements(m.x >= 0, m.y >= 0))
+        m.f = pyo.Objective(expr=(m.x + 1) ** 2 + 2 * (m.y + 1) ** 2)
+        m.dual = pyo.Suffix(direction=pyo.Suffix.IMPORT)
+        if factor:
+            m.scaling_factor = pyo.Suffix(direction=pyo.Suffix.EXPORT)
+            m.scaling_factor[m.x], m.scaling_factor[m.k], m.scaling_factor[m.f] = factor, 1 / factor, 0.1
+        results = pyo.SolverFactory('mpec_hybrid').solve(m)
+        answers.append((m.x.value, m.y.value, pyo.value(m.f), m.dual[m.k], results.problem.upper_bound))
+    assert answers[0] == pytest.approx((0.5, 0, 4.25, 3, 4.25), rel=1e-6, abs=1e-6)
+    assert answers[1] == pytest.approx(answers[0], rel=1e-6, abs=1e-6)

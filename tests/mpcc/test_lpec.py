@@ -10,8 +10,8 @@ from pyomo.mpec import Complementarity, complements
 from pyomo_fesd.mpcc.active_set import G_ZERO, H_ZERO, active_sets
 from pyomo_fesd.mpcc.compile import compile_problem
 from pyomo_fesd.mpcc.lpec import Lpec
-from pyomo_fesd.mpcc.sides import sort_sides
 from pyomo_fesd.mpcc.problem import read_problem
+from pyomo_fesd.mpcc.sides import sort_sides
 
 
 def lpec_at(model, w, tolerance=1e-6, Delta=1.0):
