@@ -212,7 +212,7 @@ class MpecHybrid(SolverBase):
             with PauseGC():
                 compiled = compile_problem(problem, timer, config.working_dir, user_scaling=config.user_scaling)
         except Contradiction as error:
-            _fill_contradiction(results, str(error))
+            _fill_contradiction(results, model, str(error))
             results.solver_config = config
             return self._deliver(results, config)
         timer.stop('compile')
@@ -279,10 +279,10 @@ def _fill(results, model, c, run):
     info.steps = run.steps
 
 
-def _fill_contradiction(results, message):
+def _fill_contradiction(results, model, message):
     """Pyomo's results where fixed values alone violate a constraint: nothing was solved."""
     results.termination_condition, results.solution_status = CONDITIONS[Outcome.INFEASIBLE]
-    results.solution_loader = _Nothing()
+    results.solution_loader = _Nothing(model)
     info = results.extra_info
     info.outcome, info.stationarity, info.reason = Outcome.INFEASIBLE.value, 'not certified', message
     info.violated, info.steps = [], []
@@ -293,6 +293,9 @@ def _fill_contradiction(results, message):
 
 class _Nothing(SolutionLoader):
     """No point at all."""
+
+    def __init__(self, model):
+        self._pyomo_model = model
 
     def get_number_of_solutions(self):
         """0."""
