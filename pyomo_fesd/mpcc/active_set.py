@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Sides of a pair, as an assignment names the one that is zero.
-G_ZERO, H_ZERO = 0, 1
+#: Sides of a pair, as an assignment names the one that is zero; FREE leaves the pair open.
+G_ZERO, H_ZERO, FREE = 0, 1, 2
 
 
 @dataclass(frozen=True)

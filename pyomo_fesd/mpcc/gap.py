@@ -6,6 +6,9 @@ and at most O(sqrt(eps)) elsewhere.  Two values in a row therefore bound how muc
 
 import numpy as np
 
+#: What is still to come counts up to this much of the incumbent's objective: two values in a row can mislead.
+TRUSTED = 5e-4
+
 
 class GapTest:
     """Relaxed objectives of one homotopy, first to last.
@@ -31,7 +34,7 @@ class GapTest:
         """Whether an incumbent with objective ``f`` does not lie above what the homotopy still promises."""
         if not self._path:
             return False
-        return f - self._path[-1][1] <= max(self._absolute, self._relative * abs(f), self._to_come())
+        return f - self._path[-1][1] <= max(self._absolute, self._relative * abs(f), min(self._to_come(), TRUSTED * abs(f)))
 
     def _to_come(self):
         """The most that the relaxed objective may still rise: sqrt(eps) extrapolated to 0 from the last two values."""

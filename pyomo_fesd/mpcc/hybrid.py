@@ -14,23 +14,29 @@ from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.gap import GapTest
 from pyomo_fesd.mpcc.recovery import LADDER
 from pyomo_fesd.mpcc.run import Outcome, Point, Run, Stop, Tolerances
+from pyomo_fesd.mpcc.search import leaves
 from pyomo_fesd.mpcc.stationarity import Stationarity
 from pyomo_fesd.mpcc.steps import Steps
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
 #: Attempts at a branch NLP before it counts as infeasible, and the iterations that the early ones may use.
-TRIES, EARLY = 3, 60
+TRIES, EARLY = 2, 60
 #: With products below this and the same sides as before, a smaller eps shows nothing new.
 EXHAUSTED = 1e-8
+#: From this eps on a relaxation is worth a branch NLP, which is much cheaper than the next relaxation, unless more than this part
+#: of the pairs could still go either way.
+TELLING, UNDECIDED = 1e-3, 0.5
+#: From this eps on multipliers are carried along; before, Ipopt's own centring finds better minima (time-optimal car, bilevel1).
+CARRIED = 1e-2
+#: More bi-active pairs than this say little, and an LPEC over them takes long.
+SUGGESTED = 50
 #: The trust region of a descent step shrinks by this, so often.
 SHRINK, SHRINKS = 0.1, 3
 #: A feasible point with variables beyond this has run away along an unbounded objective.
 UNBOUNDED = 1e15
 #: Trust region of the LPEC that looks for any feasible branch.
 FAR = 1e3
-#: Branch-and-bound nodes for an LPEC that only suggests a branch.
-SUGGESTION = {'mip_max_nodes': 100}
 #: Without an objective any solution will do, and the elastic form is by far the quickest to one; with an objective it settles
 #: early in worse minima than Scholtes' (gas-liquid optimal control: 250.005 instead of 250).  A failure changes the form.
 AUTO = {False: ('elastic', 'scholtes'), True: ('scholtes', 'elastic')}
@@ -93,10 +99,10 @@ class HybridSolver:
         w, eps, duals, previous = self._c.x0, options.eps_init, None, None
         while True:
             self.run.eps = eps
-            relaxed = self._steps.relax(self._forms[form], w, eps, duals)
+            relaxed = self._steps.relax(self._forms[form], w, eps, duals if eps <= 1.001 * CARRIED else None)
             self._keep_least_infeasible(relaxed.w)
             if not self._steps.usable(relaxed):
-                if not ladder:
+                if not ladder or self._certified_incumbent():
                     return
                 step = ladder.pop(0)
                 self._steps.note(step.what, relaxed.w)
@@ -111,7 +117,8 @@ class HybridSolver:
             sets = active_sets(at.G, at.H, self._steps.biactive(at))
             last = eps <= 1.001 * options.eps_final  # products of eps_factor carry round-off
             exhausted = np.max(at.G * at.H, initial=0.0) <= EXHAUSTED and sets.same_sides(previous)
-            if sets.same_sides(previous) or last or not sets.gamma.any():
+            telling = eps <= 1.001 * TELLING and np.count_nonzero(sets.gamma) <= UNDECIDED * len(sets.gamma)
+            if telling or sets.same_sides(previous) or last or not sets.gamma.any():
                 self._explore(relaxed, sets, last or exhausted)
                 if self._settled():
                     return
@@ -124,7 +131,9 @@ class HybridSolver:
                 self._gap.restart()
                 self._tried.clear()
                 continue
-            previous, eps = sets, max(eps * options.eps_factor, options.eps_final)
+            # nothing changes before eps falls below the largest product
+            biting = min(eps, np.max(at.G * at.H, initial=0.0))
+            previous, eps = sets, max(biting * options.eps_factor, options.eps_final)
 
     def restore(self, w):
         """The nearest point that the feasibility phase finds, with pairs as loose as at the start."""
@@ -135,9 +144,11 @@ class HybridSolver:
         if self.run.w is None or self._steps.violation(w) < self._steps.violation(self.run.w):
             self.run.w = w
 
+    def _certified_incumbent(self):
+        return self.run.point is not None and self.run.point.certificate.certified
+
     def _settled(self):
-        point = self.run.point
-        return point is not None and point.certificate.certified and self._gap.closed(point.f)
+        return self._certified_incumbent() and self._gap.closed(self.run.point.f)
 
     def _last_resort(self):
         """Nothing feasible: the LPEC with every pair as a binary names the branch whose linearisation is feasible, if there is one.
@@ -147,9 +158,14 @@ class HybridSolver:
         self._tried.clear()
         for w in (self.run.w, self._c.x0):
             sets = active_sets(*self._sides(w), np.inf)
-            step = self._steps.lpec(w, sets, FAR, limits=SUGGESTION)
+            step = self._steps.suggestion(w, sets, FAR)
             if step.solved:
                 self._improve_from(self._point(w + step.d, step.zero, None, True))
+            if self.run.point is not None:
+                return
+        self._steps.note("search over the pairs", self.run.w)
+        for w, zero in leaves(self._c, self._steps.branch, self._c.x0, self._tolerances.feasibility):
+            self._improve_from(self._point(w, zero, None, True))
             if self.run.point is not None:
                 return
         self.run.w = self._steps.restore(self.run.w, self._options.eps_final).w
@@ -160,15 +176,18 @@ class HybridSolver:
     def _explore(self, relaxed, sets, final):
         """Solve the branch that the active sets name; descend from it as long as the LPEC shows a way."""
         zero, w = sets.zero, self.run.w if relaxed is None else relaxed.w
-        if sets.gamma.any() and self._c.has_objective and self._tried[zero.tobytes()] < TRIES:
-            zero = self._steps.lpec(w, sets, self._tolerances.radius, limits=SUGGESTION).zero
-        self._improve_from(self._point(w, zero, relaxed, final))
+        point = self._point(w, zero, relaxed, final)
+        if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
+            zero = self._steps.suggestion(w, sets, self._tolerances.radius).zero
+            point = self._point(w, zero, relaxed, final)
+        self._improve_from(point, final)
 
-    def _improve_from(self, point):
-        """Keep ``point`` and what descends from it."""
+    def _improve_from(self, point, final=True):
+        """Keep ``point`` and what descends from it, while the homotopy does not promise something much better."""
         while point is not None:
             self._keep(point)
-            point = self._descend(point) if point.certificate.grade is Stationarity.DESCENT else None
+            descends = point.certificate.grade is Stationarity.DESCENT and (final or self._gap.closed(point.f))
+            point = self._descend(point) if descends else None
 
     def _descend(self, point):
         """A better point in the branch of the LPEC's direction: from its end, or within ever smaller trust regions."""

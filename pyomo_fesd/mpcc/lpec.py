@@ -209,8 +209,11 @@ class Lpec:
             highs.setSolution(guess)
             highs.run()
             status = highs.getModelStatus()
-            if status in ENDED_WELL or (limits and status in LIMITED and highs.getSolution().value_valid):
+            stopped = bool(limits) and status in LIMITED
+            if status in ENDED_WELL or (stopped and highs.getSolution().value_valid):
                 return np.array(highs.getSolution().col_value)
+            if stopped:
+                return None
         return None
 
 

@@ -77,6 +77,8 @@ def elastic(G, H, eps):
     return Terms(G * H - s, cost=s / eps, slack=s)
 
 
+#: A relaxation only leads to a branch, so its stationarity may be coarse; but what it shows of the pairs must be right to eps.
+LEADING = {'constr_viol_tol': 1e-8}
 #: First value of the slack: 1, or just above what the start violates once that is less.
 ROOM = 1e-2
 
@@ -97,7 +99,7 @@ class Relaxation:
             # the slack's column is dense, which would defeat casadi's colouring
             w = ca.vertcat(c.x, terms.slack)
             jacobian = ca.horzcat(ca.jacobian(rows, c.x), ca.jacobian(rows, terms.slack))
-        self._nlp = make(form.__name__, w, ca.vertcat(eps, c.p), c.f + c.penalty + terms.cost, rows, jacobian=jacobian)
+        self._nlp = make(form.__name__, w, ca.vertcat(eps, c.p), c.f + c.penalty + terms.cost, rows, LEADING, jacobian=jacobian)
 
     def solve(self, w, eps, duals=None):
         """Solve from ``w``, with the multipliers of an earlier result of this form if given."""

@@ -18,6 +18,10 @@ from pyomo_fesd.mpcc.stationarity import certify
 #: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
 BIACTIVE = 3.0
 
+#: HiGHS for an LPEC that only suggests a branch: the first that it finds will do, in the time that the NLPs took so far or this.
+SUGGESTION = {'mip_max_nodes': 100, 'mip_max_improving_sols': 1, 'presolve': 'off'}
+LEAST_TIME = 0.1
+
 #: What NLP solvers say of a problem that they found infeasible: the model's own rows may hold there, the pairs do not.
 INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
 
@@ -74,6 +78,11 @@ class Steps:
         self._count(result)
         self._log('lpec', 0.0, w, 0, f'{result.value:.1e}' if result.solved else 'unsolved', started)
         return result
+
+    def suggestion(self, w, sets, Delta):
+        """An LPEC that may give up early."""
+        spent = sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch'))
+        return self.lpec(w, sets, Delta, limits=SUGGESTION | {'time_limit': max(LEAST_TIME, spent)})
 
     def certify(self, nlp, equal):
         """The certificate for the solution of a branch NLP."""
