@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from pyomo_fesd.mpcc.compiled import csr_pattern
+from pyomo_fesd.mpcc.derivatives import Outer, composed
 
 #: A branch starts near its solution, but neither so close to the bounds that Ipopt cannot turn, nor pushed far from them.
 NEAR = {
@@ -34,17 +35,18 @@ class Branch:
     compiled : Compiled
     sides : Sides
     make : callable
-        makes an ``NlpSolver`` from a name, x, p, f, g and perhaps a budget and a Jacobian
+        makes an ``NlpSolver`` from a name, x, p, f, g and perhaps a budget and derivatives
     """
 
     def __init__(self, compiled, sides, make):
         c = compiled
         self._c, self._sides = c, sides
-        weight = ca.SX.sym('weight')
-        g = ca.vertcat(c.g, sides.rows, c.equal)
-        self._pattern = csr_pattern(ca.jacobian(g, c.x))
-        self._values = ca.Function('rows', [c.x, c.p], [g])
-        self._nlp = make('branch', c.x, ca.vertcat(weight, c.p), c.f + weight * c.penalty, g, budget=NEAR)
+        weight, z = ca.SX.sym('weight'), ca.SX.sym('z', c.derivatives.z.shape[0])
+        rows = ca.vertcat(z[sides.chosen.tolist()], z[2 * c.G.numel() :])
+        nlp = composed(c, weight, Outer(z, ca.SX(0, 1), ca.SX(0), rows))
+        self._pattern = csr_pattern(nlp.derivatives.jacobian)
+        self._values = ca.Function('rows', [c.x, c.p], [nlp.g])
+        self._nlp = make('branch', nlp.x, ca.vertcat(weight, c.p), nlp.f, nlp.g, NEAR, nlp.derivatives)
 
     def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None):
         """Solve the branch ``zero`` from ``w``.
@@ -86,7 +88,7 @@ class Branch:
         """Multipliers of a relaxation for the rows that a branch shares with it, zero for the others."""
         if duals is None:
             return None
-        rows, shared = len(self._c.lbg) + self._sides.rows.numel(), np.zeros(self._pattern.shape[0])
+        rows, shared = len(self._c.lbg) + len(self._sides.chosen), np.zeros(self._pattern.shape[0])
         shared[:rows] = duals.lam_g[:rows]
         return duals.with_multipliers(duals.lam_x[: len(self._c.x0)], shared)
 
@@ -104,7 +106,7 @@ class Branch:
     def _row_bounds(self, zero, equal):
         c, sides = self._c, self._sides
         own = sides.row_of >= 0
-        upper = np.full(sides.rows.numel(), np.inf)
+        upper = np.full(len(sides.chosen), np.inf)
         upper[sides.row_of[own & sides.zero_rows(zero)]] = 0.0
         equal = np.zeros(c.equal.numel(), dtype=bool) if equal is None else equal
         free = np.where(equal, 0.0, np.inf)

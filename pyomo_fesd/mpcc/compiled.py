@@ -6,10 +6,13 @@ A ``Compiled`` can be pickled and sent to another process: the casadi graph goes
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
+
+from pyomo_fesd.mpcc.derivatives import ModelDerivatives
 
 
 @dataclass(frozen=True)
@@ -85,8 +88,15 @@ class Compiled:
         for name, expression in zip(self.NAMES, graph(self.x, self.p)):
             setattr(self, name, expression)
         self._values = ca.Function('values', [self.x, self.p], [self.f, self.g, self.G, self.H, self.eta])
-        jacobians = [ca.jacobian(e, self.x) for e in (self.g, self.G, self.H, self.equal)]
-        self._gradients = ca.Function('gradients', [self.x, self.p], [ca.gradient(self.f, self.x), *jacobians])
+
+    @cached_property
+    def derivatives(self):
+        """Derivatives of all functions, found when they are first needed."""
+        return ModelDerivatives(self)
+
+    @cached_property
+    def _gradients(self):
+        return ca.Function('gradients', [self.x, self.p], [self.derivatives.f, *self.derivatives.parts])
 
     def __getstate__(self):
         return self._graph, self._numbers

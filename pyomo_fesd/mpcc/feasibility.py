@@ -19,16 +19,17 @@ class Feasibility:
     def __init__(self, c, sides, make):
         self._c = c
         eps = ca.SX.sym('eps')
-        rows = ca.vertcat(c.g, sides.rows, c.G * c.H - eps)
-        lbg = np.concatenate([c.lbg, np.zeros(sides.rows.numel()), np.full(c.G.numel(), -np.inf)])
-        ubg = np.concatenate([c.ubg, np.full(sides.rows.numel(), np.inf), np.zeros(c.G.numel())])
+        S = ca.vertcat(c.G, c.H)
+        rows = ca.vertcat(c.g, S[sides.chosen.tolist()], c.G * c.H - eps)
+        self._rows = ca.Function('rows', [c.x, ca.vertcat(eps, c.p)], [rows])
+        lbg = np.concatenate([c.lbg, np.zeros(len(sides.chosen)), np.full(c.G.numel(), -np.inf)])
+        ubg = np.concatenate([c.ubg, np.full(len(sides.chosen), np.inf), np.zeros(c.G.numel())])
         up, down = np.flatnonzero(np.isfinite(lbg)), np.flatnonzero(np.isfinite(ubg))
         p, n = ca.SX.sym('p', len(up)), ca.SX.sym('n', len(down))
         rows[up.tolist()] += p
         rows[down.tolist()] -= n
         self._lbg, self._ubg, self._parts = lbg, ubg, len(up) + len(down)
         self._up, self._down = up, down
-        self._rows = ca.Function('rows', [c.x, ca.vertcat(eps, c.p)], [ca.vertcat(c.g, sides.rows, c.G * c.H - eps)])
         self._nlp = make('feasibility', ca.vertcat(c.x, p, n), ca.vertcat(eps, c.p), ca.sum1(p) + ca.sum1(n), rows)
 
     def solve(self, w, eps):

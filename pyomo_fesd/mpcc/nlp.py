@@ -100,8 +100,8 @@ class NlpSolver(ABC):
     budget : dict
         our wishes, in Ipopt's names (``max_iter``, ``tol``, ``mu_init``, ...); each solver follows those that it has
     deadline : Deadline, optional
-    jacobian : SX, optional
-        of g by x, where it is known more cheaply than casadi finds it (one dense column defeats its colouring)
+    derivatives : Derivatives, optional
+        where they are known more cheaply than casadi finds them
     options : dict, optional
         the user's, in the solver's own names; they are passed through and win
 
@@ -117,7 +117,7 @@ class NlpSolver(ABC):
         return None
 
     @abstractmethod
-    def __init__(self, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
         pass
 
     @abstractmethod

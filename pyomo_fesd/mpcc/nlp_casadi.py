@@ -14,6 +14,7 @@ import numpy as np
 from pyomo.common.tee import capture_output
 
 from pyomo_fesd.mpcc.deadline import Deadline
+from pyomo_fesd.mpcc.derivatives import automatic
 from pyomo_fesd.mpcc.nlp import (
     IPOPT,
     IPOPT_WARM,
@@ -41,8 +42,6 @@ UNO_NAMES = {
 UNIFIED = {'SOLVER_RET_LIMITED': 'iteration or time limit', 'SOLVER_RET_NAN': 'error'}
 #: Ends of the tiny problem on which options are tried that only these can have caused.
 REFUSED = ('Invalid_Option', 'error')
-#: casadi's options for derivatives, and where an earlier solver has them.
-DERIVATIVES = {'grad_f': 'nlp_grad_f', 'jac_g': 'nlp_jac_g', 'hess_lag': 'nlp_hess_l'}
 #: Ipopt leaves its counter unset when it does not begin.
 NOT_BEGUN = ('Not_Enough_Degrees_Of_Freedom', 'Invalid_Problem_Definition', 'Invalid_Option')
 #: Uno's own numbers for the types of its options.
@@ -76,27 +75,28 @@ class _Watch(ca.Callback):
 class _CasadiNlp(NlpSolver):
     """What the two have in common: casadi's ``nlpsol``.  See ``NlpSolver``."""
 
-    #: Name of casadi's plug-in, what keeps it silent, whether it takes a Jacobian.
-    PLUGIN, SILENT, TAKES_JACOBIAN = '', {}, False
+    #: Name of casadi's plug-in, what keeps it silent, whether it takes derivatives of ours.
+    PLUGIN, SILENT, TAKES_DERIVATIVES = '', {}, False
 
     @staticmethod
     def missing(name):
         """Why casadi does not have it; None if it does."""
         return None if ca.has_nlpsol(name) else f"casadi {ca.__version__} was built without it"
 
-    def __init__(self, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
         self._size, options = x.numel() + g.numel(), options or {}
         check_options(self.PLUGIN, options, self._complaint)
-        settings = {'print_time': False, self.PLUGIN: self._settings(budget, options)}
-        if jacobian is not None and self.TAKES_JACOBIAN:
-            settings['jac_g'] = ca.Function('nlp_jac_g', [x, p], [g, jacobian], ['x', 'p'], ['g', 'jac_g_x'])
-        self._watch = settings['iteration_callback'] = _Watch(x.numel(), g.numel(), p.numel(), deadline or Deadline())
-        self._make = lambda more: ca.nlpsol(name, self.PLUGIN, {'x': x, 'p': p, 'f': f, 'g': g}, settings | more)
-        self._solver = self._make({})
+        self._watch = _Watch(x.numel(), g.numel(), p.numel(), deadline or Deadline())
+        settings = {'print_time': False, 'iteration_callback': self._watch}
+        if self.TAKES_DERIVATIVES:
+            settings |= _functions(x, p, f, g, derivatives or automatic(x, f, g))
+        self._make = lambda ours: ca.nlpsol(name, self.PLUGIN, {'x': x, 'p': p, 'f': f, 'g': g}, settings | {self.PLUGIN: ours})
+        self._options, self._made = (budget, options), {}
+        self._f = ca.Function('f', [x, p], [f])
 
     @abstractmethod
-    def _settings(self, budget, options):
-        """What to pass to the solver."""
+    def _settings(self, budget, options, warm=False):
+        """What to pass to the solver, for a start without or with multipliers."""
 
     def _status(self, stats):
         """The solver's own status from casadi's statistics."""
@@ -114,14 +114,16 @@ class _CasadiNlp(NlpSolver):
                 return f'{said.getvalue()} {str(error).splitlines()[-1]}'
         return "invalid value" if self._status(solver.stats()) in REFUSED else None
 
-    def _solver_for(self, duals):
-        """The solver for a start without or with multipliers."""
-        return self._solver
+    def _solver_for(self, warm):
+        """The solver for a start without or with multipliers, made when it is first needed."""
+        if warm not in self._made:
+            self._made[warm] = self._make(self._settings(*self._options, warm))
+        return self._made[warm]
 
     def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
         """Solve from ``w0``; see ``NlpSolver``."""
         said = io.StringIO()
-        solver = self._solver_for(duals)
+        solver = self._solver_for(duals is not None)
         self._watch.left = np.inf if max_iter is None else max_iter
         start = {} if duals is None else {'lam_x0': duals.lam_x, 'lam_g0': duals.lam_g}
         with redirect_stderr(said), interruptible():
@@ -140,29 +142,16 @@ class _CasadiNlp(NlpSolver):
     def _failed(self, w0, p, m, status='error'):
         """The result where the solver gives no point."""
         w = np.array(w0, dtype=float)
-        f = float(self._solver.get_function('nlp_f')(w, p))
-        return NlpResult(w, f, status, 0, np.zeros(m), np.zeros(len(w)))
+        return NlpResult(w, float(self._f(w, p)), status, 0, np.zeros(m), np.zeros(len(w)))
 
 
 class CasadiIpopt(_CasadiNlp):
     """Ipopt.  See ``NlpSolver``."""
 
-    PLUGIN, SILENT, TAKES_JACOBIAN = 'ipopt', {'print_level': 0, 'sb': 'yes'}, True
+    PLUGIN, SILENT, TAKES_DERIVATIVES = 'ipopt', {'print_level': 0, 'sb': 'yes'}, True
 
-    def __init__(self, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
-        super().__init__(name, x, p, f, g, budget, deadline, jacobian, options)
-        self._warm, self._warm_settings = None, IPOPT | budget | IPOPT_WARM | (options or {})
-
-    def _settings(self, budget, options):
-        return IPOPT | budget | options
-
-    def _solver_for(self, duals):
-        if duals is None:
-            return self._solver
-        if self._warm is None:
-            derivatives = {option: self._solver.get_function(function) for option, function in DERIVATIVES.items()}
-            self._warm = self._make(derivatives | {'ipopt': self._warm_settings})
-        return self._warm
+    def _settings(self, budget, options, warm=False):
+        return IPOPT | budget | (IPOPT_WARM if warm else {}) | options
 
 
 class CasadiUno(_CasadiNlp):
@@ -178,10 +167,10 @@ class CasadiUno(_CasadiNlp):
         except (OSError, AttributeError) as error:
             return f"casadi {ca.__version__} has none with a C interface ({error})"
 
-    def __init__(self, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
         # on a violated row without variables Uno's QP solver may never return, whatever the limits
         self._varying, self._g = rows_with_variables(g, x), ca.Function('g', [x, p], [ca.densify(g)])
-        super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, jacobian, options)
+        super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, derivatives, options)
 
     def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
         """Solve from ``w0``; see ``NlpSolver``."""
@@ -195,7 +184,7 @@ class CasadiUno(_CasadiNlp):
         lam_g[varying] = result.lam_g
         return replace(result, lam_g=lam_g)
 
-    def _settings(self, budget, options):
+    def _settings(self, budget, options, warm=False):
         # without the types casadi would drop what Uno does not take, silently
         ours = {new: value for old, value in budget.items() for new in UNO_NAMES.get(old, ())}
         ours |= {'logger': 'SILENT', 'preset': 'filtersqp' if self._size < UNO_LARGE else 'ipopt'}
@@ -203,6 +192,17 @@ class CasadiUno(_CasadiNlp):
 
     def _status(self, stats):
         return UNIFIED.get(stats['unified_return_status'], stats['return_status'])
+
+
+def _functions(x, p, f, g, d):
+    """casadi's options for derivatives."""
+    return {
+        'grad_f': ca.Function('nlp_grad_f', [x, p], [f, ca.densify(d.gradient)], ['x', 'p'], ['f', 'grad_f_x']),
+        'jac_g': ca.Function('nlp_jac_g', [x, p], [g, d.jacobian], ['x', 'p'], ['g', 'jac_g_x']),
+        'hess_lag': ca.Function(
+            'nlp_hess_l', [x, p, d.lam_f, d.lam_g], [d.hessian], ['x', 'p', 'lam_f', 'lam_g'], ['triu_hess_gamma_x_x']
+        ),
+    }
 
 
 def _iterations(stats):

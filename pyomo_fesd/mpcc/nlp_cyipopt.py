@@ -9,6 +9,7 @@ import numpy as np
 from pyomo.common.tee import capture_output
 
 from pyomo_fesd.mpcc.deadline import Deadline
+from pyomo_fesd.mpcc.derivatives import automatic
 from pyomo_fesd.mpcc.nlp import (
     IPOPT,
     IPOPT_WARM,
@@ -90,18 +91,18 @@ class _Callbacks:
 class CyIpopt(NlpSolver):
     """Ipopt of the system.  Defaults of ours that its version does not know are left out.  See ``NlpSolver``."""
 
-    def __init__(self, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
-        jacobian = ca.jacobian(g, x) if jacobian is None else jacobian
-        lam, weight = ca.SX.sym('lam', g.numel()), ca.SX.sym('weight')
-        hessian = ca.tril(ca.hessian(weight * f + ca.dot(lam, g), x)[0])
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
+        d = derivatives or automatic(x, f, g)
+        # Ipopt wants the lower triangle
+        hessian = d.hessian.T
         functions = {
             'f': ca.Function('f', [x, p], [f]),
             'g': ca.Function('g', [x, p], [ca.densify(g)]),
-            'gradient': ca.Function('gradient', [x, p], [ca.densify(ca.gradient(f, x))]),
-            'jacobian': ca.Function('jacobian', [x, p], [jacobian.nz[:]]),
-            'hessian': ca.Function('hessian', [x, p, lam, weight], [hessian.nz[:]]),
+            'gradient': ca.Function('gradient', [x, p], [ca.densify(d.gradient)]),
+            'jacobian': ca.Function('jacobian', [x, p], [d.jacobian.nz[:]]),
+            'hessian': ca.Function('hessian', [x, p, d.lam_g, d.lam_f], [hessian.nz[:]]),
         }
-        self._callbacks = _Callbacks(functions, _places(jacobian), _places(hessian), deadline or Deadline())
+        self._callbacks = _Callbacks(functions, _places(d.jacobian), _places(hessian), deadline or Deadline())
         self._f, self._lagrangian = functions['f'], lagrangian_gradient(x, p, f, g)
         options = options or {}
         check_options('cyipopt', options, _complaint)

@@ -92,7 +92,7 @@ class Executable(NlpSolver):
         name for Pyomo's ``SolverFactory``
     """
 
-    def __init__(self, solver, name, x, p, f, g, budget, deadline=None, jacobian=None, options=None):
+    def __init__(self, solver, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
         options = options or {}
         check_options(solver, options, partial(_complaint, solver))
         wishes = {key: value for key, value in (IPOPT | budget).items() if key not in ('print_level', 'sb')}

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
+from pyomo_fesd.mpcc.derivatives import Outer, composed
+
 
 @dataclass
 class Terms:
@@ -88,18 +90,15 @@ class Relaxation:
 
     def __init__(self, c, sides, form, make):
         eps = ca.SX.sym('eps')
-        terms = form(c.G, c.H, eps)
-        self._c, self._slack = c, int(terms.slack is not None)
-        rows = ca.vertcat(c.g, sides.rows, terms.rows)
-        signs, count = sides.rows.numel(), terms.rows.numel()
+        z, q = ca.SX.sym('z', c.derivatives.z.shape[0]), c.G.numel()
+        terms = form(z[:q], z[q : 2 * q], eps)
+        slack = ca.SX(0, 1) if terms.slack is None else terms.slack
+        self._c, self._slack = c, slack.numel()
+        signs, count = len(sides.chosen), terms.rows.numel()
         self._lbg = np.concatenate([c.lbg, np.zeros(signs), np.full(count, 0.0 if terms.equal else -np.inf)])
         self._ubg = np.concatenate([c.ubg, np.full(signs, np.inf), np.zeros(count)])
-        w, jacobian = c.x, None
-        if self._slack:
-            # the slack's column is dense, which would defeat casadi's colouring
-            w = ca.vertcat(c.x, terms.slack)
-            jacobian = ca.horzcat(ca.jacobian(rows, c.x), ca.jacobian(rows, terms.slack))
-        self._nlp = make(form.__name__, w, ca.vertcat(eps, c.p), c.f + c.penalty + terms.cost, rows, LEADING, jacobian=jacobian)
+        nlp = composed(c, 1.0, Outer(z, slack, ca.SX(terms.cost), ca.vertcat(z[sides.chosen.tolist()], terms.rows)))
+        self._nlp = make(form.__name__, nlp.x, ca.vertcat(eps, c.p), nlp.f, nlp.g, LEADING, nlp.derivatives)
 
     def solve(self, w, eps, duals=None):
         """Solve from ``w``, with the multipliers of an earlier result of this form if given."""

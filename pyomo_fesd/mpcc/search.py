@@ -1,7 +1,7 @@
 """Depth-first search over the pairs, for problems whose feasible branches neither Reg(eps) nor the LPEC finds.
 
-A node fixes one side of some pairs to zero and asks only for G, H >= 0 of the others.  Its solution either violates no pair, and then
-names a branch, or it is split on the pair that it violates most, the side that is nearer to zero first.  A node without a
+A node fixes one side of some pairs to zero and asks only for G, H >= 0 of the others.  Its solution either violates no pair, and
+then names a branch, or it is split on the pair that it violates most, the side that is nearer to zero first.  A node without a
 feasible point is not followed: where the NLPs are convex, an exhausted search proves that there is no feasible branch.
 
 Source: Bard, Moore, SIAM J. Sci. Stat. Comput. 11 (1990) 281.

@@ -24,15 +24,15 @@ class Sides:
 
     Attributes
     ----------
-    rows : SX
-        sides that need a row of their own
+    chosen : int array
+        sides that need a row of their own, each once
     row_of : int array (2q)
-        position of a side in ``rows``, -1 where bounds do
+        position of a side among these rows, -1 where bounds do
     fixings : csr (2q, n)
         bound at which a side without a row is zero: 1 the variable's lower, 2 its upper
     """
 
-    rows: object
+    chosen: np.ndarray
     row_of: np.ndarray
     fixings: object
 
@@ -45,7 +45,7 @@ def sort_sides(c):
     """Sort the sides of a compiled MPCC."""
     S = ca.vertcat(c.G, c.H)
     if S.numel() == 0:
-        return Sides(ca.SX(0, 1), np.zeros(0, dtype=int), sparse.csr_matrix((0, len(c.x0))))
+        return Sides(np.zeros(0, dtype=int), np.zeros(0, dtype=int), sparse.csr_matrix((0, len(c.x0))))
     nonlinear = np.array(ca.which_depends(S, c.x, 2, True))
     _, _, J_G, J_H, _ = c.gradients(c.x0)
     at = c.evaluate(c.x0)
@@ -57,8 +57,7 @@ def sort_sides(c):
     needed = np.flatnonzero(~fixable)
     _, first, row = np.unique(c.side_of[needed], return_index=True, return_inverse=True)
     row_of[needed] = row
-    chosen = needed[first]
-    return Sides(S[chosen.tolist()] if len(chosen) else ca.SX(0, 1), row_of, direction)
+    return Sides(needed[first], row_of, direction)
 
 
 def _least(A, lower, upper):

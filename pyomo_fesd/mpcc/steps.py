@@ -118,11 +118,11 @@ class Steps:
                 self._built[name] = construct(partial(self._make, kind))
         return self._built[name]
 
-    def _make(self, kind, name, x, p, f, g, budget=None, jacobian=None):
+    def _make(self, kind, name, x, p, f, g, budget=None, derivatives=None):
         """An NLP solver of the user's choice, with the limits that its kind has."""
         options = self._options
         ours = {'max_iter': getattr(options, f'{kind}_iterations'), 'tol': getattr(options, f'{kind}_tol')} | (budget or {})
-        return self._solver(name, x, p, f, g, ours, self._deadline, jacobian, options.nlp_options.value())
+        return self._solver(name, x, p, f, g, ours, self._deadline, derivatives, options.nlp_options.value())
 
     def _nlp(self, kind, eps, solve):
         with self._timed(kind) as started:
