@@ -8,6 +8,7 @@ eps nor a branch needs a rebuild.
 import os
 import tempfile
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -21,9 +22,11 @@ from pyomo.repn.plugins.nl_writer import NLWriter
 
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.mpcc.compiled import Compiled, Numbers, csr
-from pyomo_fesd.mpcc.parameters import symbols
+from pyomo_fesd.mpcc.parameters import parameter_values, symbols
+from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.mpcc.problem import Condition
 from pyomo_fesd.mpcc.scaling import Scale, UserFactors, side_factors
+from pyomo_fesd.mpcc.source import Contradiction, Source, set_parts, start_values
 from pyomo_fesd.timeindex import refuse_foreign
 
 #: Nodes that casadi's NL reader cannot evaluate.
@@ -31,10 +34,6 @@ UNSUPPORTED_NODES = (ExternalFunctionExpression, Expr_ifExpression)
 #: A bound that no sum reaches.
 ALWAYS = 1e300
 UNSUPPORTED_FUNCTIONS = ('asinh', 'acosh', 'atanh')
-
-
-class Contradiction(Exception):
-    """The NL writer found a constraint that no value of the free variables can meet; the message names it."""
 
 
 def compile_problem(problem, timer, folder=None, parameters=(), user_scaling=True):
@@ -59,27 +58,29 @@ def compile_problem(problem, timer, folder=None, parameters=(), user_scaling=Tru
         where fixed values alone violate a constraint
     """
     factors = UserFactors(problem.model, user_scaling)
-    with symbols(problem.model, parameters) as handles, _sides(problem, handles) as (scratch, rows, conditions):
-        timer.start('write')
-        try:
-            with tempfile.TemporaryDirectory() as temporary:
-                path = os.path.join(folder or temporary, 'model.nl')
-                with open(path, 'w', newline='') as stream:
-                    info = _write(problem.model, stream)
-                timer.stop('write')
-                refuse_foreign(info.variables, problem.model.model(), problem.model)
-                timer.start('import')
-                nl = _import(problem.model, path)
-        except InfeasibleConstraintException as error:
-            raise Contradiction(str(error)) from None
-        compiled = _assemble(problem, conditions, rows, info, nl, handles, factors)
-        timer.stop('import')
-    return compiled
+    with symbols(problem.model, parameters) as handles, _sides(problem, handles) as scratch:
+        with tempfile.TemporaryDirectory() as temporary:
+            path = os.path.join(folder or temporary, 'model.nl')
+            with phase(timer, 'write'):
+                info = _write(problem.model, path)
+            refuse_foreign(info.variables, problem.model.model(), problem.model)
+            with phase(timer, 'import'):
+                nl = _import(problem.model, path, handles)
+                return _assemble(problem, scratch, info, nl, parameters, handles, factors)
+
+
+@dataclass(frozen=True)
+class _Scratch:
+    """Rows of the scratch block by group, the conditions in their order, and auxiliary variables as in ``Source``."""
+
+    rows: dict
+    conditions: list
+    splits: list
 
 
 @contextmanager
 def _sides(problem, handles):
-    """A scratch block with a row for every expression that the MPCC needs; the pairs sleep while it exists."""
+    """What a scratch block holds for every expression that the MPCC needs; the pairs sleep while it exists."""
     model, scratch = problem.model, Block()
     model.add_component(unique_component_name(model, '_pyomo_fesd_scratch'), scratch)
     asleep = _sleep(problem.sources)
@@ -91,28 +92,25 @@ def _sides(problem, handles):
         scratch.part = VarList()
         if problem.objective is None:
             scratch.objective = Objective(expr=0)
-        conditions = problem.conditions + [c for source, m in problem.mixed for c in _split(scratch, source, m)]
+        splits = []
+        conditions = problem.conditions + [c for source, m in problem.mixed for c in _split(scratch, source, m, handles, splits)]
         known = {}
         rows = {
-            'G': [_shared_row(scratch, handles.in_terms(c.G), known) for c in conditions],
-            'H': [_shared_row(scratch, handles.in_terms(c.H), known) for c in conditions],
-            'eta': [_row(scratch, d.eta) for d in problem.decisions],
-            'equal': [_row(scratch, d.constraint.body - d.constraint.upper) for d in problem.decisions],
-            'penalty': [_row(scratch, weight * term.expr) for term, weight in problem.penalties],
-            'present': _presence(scratch, handles),
+            'G': [_shared_row(scratch, c.G, handles, known) for c in conditions],
+            'H': [_shared_row(scratch, c.H, handles, known) for c in conditions],
+            'eta': [_row(scratch, handles.in_terms(d.eta)) for d in problem.decisions],
+            'equal': [_row(scratch, handles.in_terms(d.constraint.body - d.constraint.upper)) for d in problem.decisions],
+            'penalty': [_row(scratch, handles.in_terms(weight * term.expr)) for term, weight in problem.penalties],
+            # parameters that stand nowhere must be in the NL file all the same
+            'present': [_keep(scratch, handles.variables)],
         }
         rows['present'] += [_keep(scratch, rows['G'] + rows['H'])]
-        yield scratch, rows, conditions
+        yield _Scratch(rows, conditions, splits)
     finally:
         model.del_component(scratch)
         for suffix in suffixes:
             suffix.activate()
         _wake(asleep)
-
-
-def _presence(scratch, handles):
-    """Parameters that stand nowhere must be in the NL file all the same."""
-    return [_keep(scratch, handles.variables)]
 
 
 def _keep(scratch, components):
@@ -138,20 +136,21 @@ def _wake(components):
             data.activate()
 
 
-def _split(scratch, source, m):
+def _split(scratch, source, m, handles, splits):
     """l <= B <= u perp F as B - l perp F+ and u - B perp F- with F = F+ - F-."""
     plus, minus = scratch.part.add(), scratch.part.add()
-    for part, now in ((plus, max(value(m.F, exception=False) or 0, 0)), (minus, max(-(value(m.F, exception=False) or 0), 0))):
-        part.setlb(0)
-        part.value = now
-    scratch.row.add(m.F == plus - minus)
+    plus.setlb(0)
+    minus.setlb(0)
+    set_parts(plus, minus, m.F)
+    splits.append((plus, minus, m.F))
+    scratch.row.add(handles.in_terms(m.F) == plus - minus)
     return [Condition(source, m.body - m.lower, plus), Condition(source, m.upper - m.body, minus)]
 
 
-def _shared_row(scratch, expr, known):
+def _shared_row(scratch, expr, handles, known):
     """As ``_row``, one for a side that stands in several pairs: its branch equation must not appear twice."""
     if id(expr) not in known:
-        known[id(expr)] = _row(scratch, expr)
+        known[id(expr)] = _row(scratch, handles.in_terms(expr))
     return known[id(expr)]
 
 
@@ -178,20 +177,25 @@ def _is_row(r):
     return hasattr(r, 'body')
 
 
-def _write(model, stream):
-    return NLWriter().write(model, stream, linear_presolve=False, scale_model=False, symbolic_solver_labels=False)
+def _write(model, path):
+    """Write the NL file; what stands in it, in its order."""
+    try:
+        with open(path, 'w', newline='') as stream:
+            return NLWriter().write(model, stream, linear_presolve=False, scale_model=False, symbolic_solver_labels=False)
+    except InfeasibleConstraintException as error:
+        raise Contradiction(str(error)) from None
 
 
-def _import(model, path):
+def _import(model, path, handles):
     builder = ca.NlpBuilder()
     try:
         builder.import_nl(path)
     except RuntimeError as error:
-        raise _unsupported(model, error) from None
+        raise _unsupported(model, error, handles) from None
     return builder
 
 
-def _unsupported(model, error):
+def _unsupported(model, error, handles):
     """Name the component whose expression casadi could not read."""
     for component in model.component_data_objects(descend_into=Block, active=True):
         expr = getattr(component, 'expr', None)
@@ -202,7 +206,7 @@ def _unsupported(model, error):
                 isinstance(node, UnaryFunctionExpression) and node.getname() in UNSUPPORTED_FUNCTIONS
             ):
                 return FesdError(
-                    component,
+                    handles.source(component),
                     f"the function '{node.getname()}' cannot be evaluated here",
                     "write it with exp, log, sqrt or a complementarity (for if-then-else: a Disjunction)",
                 )
@@ -218,8 +222,9 @@ def _nodes(expr):
             stack.extend(node.args)
 
 
-def _assemble(problem, conditions, rows, info, nl, handles, factors):
+def _assemble(problem, scratch, info, nl, parameters, handles, factors):
     """Split the NL's rows into the model's own and those that we asked for, as one scaled function."""
+    rows, conditions = scratch.rows, scratch.conditions
     columns = ComponentMap((v, j) for j, v in enumerate(info.variables))
     place = ComponentMap((c, i) for i, c in enumerate(info.constraints))
     lower, upper = np.array(nl.g_lb, dtype=float), np.array(nl.g_ub, dtype=float)
@@ -250,9 +255,10 @@ def _assemble(problem, conditions, rows, info, nl, handles, factors):
         return ca.vertcat(*map(sx, rows[name])) if rows[name] else ca.SX(0, 1)
 
     names = rows['G'] + rows['H']
-    start, missing = _start(variables)
+    start, _ = start_values(variables)
     sides = ca.vertcat(group('G'), group('H'))
-    s_sides = _scale_sides(sides, w, p, names, start * s_x, handles, dict(zip(free, s_x)), columns, factors.of(sources * 2))
+    point = start * s_x, parameter_values(parameters)
+    s_sides = _scale_sides(sides, w, p, names, point, dict(zip(free, s_x)), columns, factors.of(sources * 2))
     q = len(conditions)
     sides = sides * s_sides
     penalty = sum(map(sx, rows['penalty']), ca.SX(0))
@@ -263,43 +269,28 @@ def _assemble(problem, conditions, rows, info, nl, handles, factors):
     kept = _distinct(side_of, q)
     both = np.concatenate([kept, kept + q])
     parts[3], parts[4] = parts[3][kept.tolist()], parts[4][kept.tolist()]
-    lbx, ubx = np.array(nl.x_lb, dtype=float)[free], np.array(nl.x_ub, dtype=float)[free]
-    plain = ComponentMap((v, j) for j, v in enumerate(variables))
-    for r in names:
-        if not _is_row(r) and r in plain:
-            lbx[plain[r]] = max(lbx[plain[r]], 0.0)
+    plain = {id(r) for r in names if not _is_row(r)}
     guide = np.array([problem.artificial.get(v.parent_component(), np.inf) for v in variables], dtype=float)
+    sides_too = np.array([id(v) in plain for v in variables], dtype=bool)
+    source = Source(variables, list(parameters), sides_too, guide, s_x, scratch.splits)
     numbers = Numbers(
-        lbx=lbx * s_x,
-        ubx=ubx * s_x,
         lbg=lower[own] * s_g,
         ubg=upper[own] * s_g,
         side_of=side_of[both],
-        artificial=np.isfinite(guide),
-        guide_ubx=np.minimum(ubx, guide) * s_x,
-        x0=np.clip(start, lbx, ubx) * s_x,
-        parameters=handles.values(),
-        missing=missing,
         sign=-1.0 if problem.objective is not None and problem.objective.sense == maximize else 1.0,
         has_objective=problem.objective is not None,
         scale=Scale(s_x, s_g, s_f, s_sides[both]),
+        **source.read(),
     )
     graph = ca.Function('mpcc', [w, p], parts)
-    return Compiled(graph, numbers, variables, constraints, [conditions[k] for k in kept], problem.decisions)
+    return Compiled(graph, numbers, variables, constraints, [conditions[k] for k in kept], problem.decisions, source)
 
 
-def _start(variables):
-    """The variables' values, 0 where there is none, and how many there are not."""
-    start = np.array([np.nan if v.value is None else v.value for v in variables], dtype=float)
-    known = np.isfinite(start)
-    return np.where(known, start, 0.0), int(np.count_nonzero(~known))
-
-
-def _scale_sides(sides, w, p, names, w0, handles, s_x, columns, given):
+def _scale_sides(sides, w, p, names, point, s_x, columns, given):
     """Factors of the sides: the variable's own for a plain variable, the user's or a mild gradient for an expression."""
     if not sides.numel():
         return np.ones(0)
-    J = csr(ca.Function('sides', [w, p], [ca.jacobian(sides, w)])(w0, handles.values()))
+    J = csr(ca.Function('sides', [w, p], [ca.jacobian(sides, w)])(*point))
     largest = np.abs(J).max(axis=1).toarray().ravel() if J.shape[1] else np.zeros(J.shape[0])
     factors = side_factors(np.where(np.isfinite(largest), largest, 0.0), given)
     for k, r in enumerate(names):

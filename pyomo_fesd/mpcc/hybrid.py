@@ -10,6 +10,7 @@ from collections import Counter
 import numpy as np
 
 from pyomo_fesd.mpcc.active_set import active_sets
+from pyomo_fesd.mpcc.built import Built
 from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.gap import GapTest
 from pyomo_fesd.mpcc.recovery import LADDER
@@ -48,15 +49,21 @@ class HybridSolver:
     show : callable Step -> None
         called after each NLP and LPEC
     deadline : Deadline, optional
+    after : callable Run -> None, optional
+        called after every outer iteration; may raise Stop
+    built : Built, optional
+        from earlier runs on the same compiled MPCC
     """
 
-    def __init__(self, compiled, options, timer, show, deadline=None):
+    def __init__(self, compiled, options, timer, show, deadline=None, after=None, built=None):
         self._c, self._options = compiled, options
         self._tolerances = Tolerances(
             options.feasibility_tol, options.biactive_tol, options.descent_tol, options.eta_tol, options.trust_radius
         )
         self.run = Run()
-        self._steps = Steps(compiled, options, self._tolerances, self.run, timer, show, deadline or Deadline())
+        self._after = after or (lambda run: None)
+        built = built or Built(compiled)
+        self._steps = Steps(compiled, options, self._tolerances, self.run, timer, show, deadline or Deadline(), built)
         self._forms = (options.relaxation,) if options.relaxation != 'auto' else AUTO[compiled.has_objective]
         self._gap = GapTest(options.gap_tol * 1e-2, options.gap_tol)
         self._tried = Counter()
@@ -89,6 +96,8 @@ class HybridSolver:
 
     def _homotopy(self):
         options = self._options
+        if options.warm_start and self._from_values():
+            return
         form, ladder = 0, list(LADDER)
         w, eps, duals, previous = self._c.x0, options.eps_init, None, None
         while True:
@@ -96,6 +105,7 @@ class HybridSolver:
             relaxed = self._steps.relax(self._forms[form], w, eps, duals)
             self._keep_least_infeasible(relaxed.w)
             if not self._steps.usable(relaxed):
+                self._after(self.run)
                 if not ladder:
                     return
                 step = ladder.pop(0)
@@ -111,10 +121,12 @@ class HybridSolver:
             sets = active_sets(at.G, at.H, self._steps.biactive(at))
             last = eps <= 1.001 * options.eps_final  # products of eps_factor carry round-off
             exhausted = np.max(at.G * at.H, initial=0.0) <= EXHAUSTED and sets.same_sides(previous)
-            if sets.same_sides(previous) or last or not sets.gamma.any():
+            ripe = sets.same_sides(previous) or last or not sets.gamma.any()
+            if ripe:
                 self._explore(relaxed, sets, last or exhausted)
-                if self._settled():
-                    return
+            self._after(self.run)
+            if ripe and self._settled():
+                return
             if last or (exhausted and self._tried[sets.zero.tobytes()] >= TRIES):
                 if self.run.point is not None or form + 1 == len(self._forms):
                     return
@@ -125,6 +137,12 @@ class HybridSolver:
                 self._tried.clear()
                 continue
             previous, eps = sets, max(eps * options.eps_factor, options.eps_final)
+
+    def _from_values(self):
+        """Whether the branch that the start values name leads to a certified point."""
+        self._keep_least_infeasible(self._c.x0)
+        self._explore(None, active_sets(*self._sides(self._c.x0), self._tolerances.biactive), False)
+        return self.run.point is not None and self.run.point.certificate.certified
 
     def restore(self, w):
         """The nearest point that the feasibility phase finds, with pairs as loose as at the start."""

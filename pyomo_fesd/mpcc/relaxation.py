@@ -127,6 +127,9 @@ class Penalty(Relaxation):
     def solve(self, w, eps, duals=None):
         """Solve from ``w`` with the weight that brings every product to ``eps``."""
         spent = 0
+        if duals is None:
+            # a new path begins
+            self._rho = self.START
         while True:
             result = super().solve(w, 1 / self._rho, duals)
             spent += result.iterations

@@ -17,6 +17,7 @@ class Outcome(Enum):
     TIME_LIMIT = "time limit reached"
     ITERATION_LIMIT = "iteration limit reached"
     INTERRUPTED = "interrupted"
+    STOPPED = "stopped by the callback"
 
 
 class Stop(Exception):

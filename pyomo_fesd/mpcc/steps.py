@@ -12,7 +12,6 @@ from pyomo_fesd.mpcc.lpec import Lpec
 from pyomo_fesd.mpcc.nlp import nlp_solver
 from pyomo_fesd.mpcc.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.run import Outcome, Step, Stop
-from pyomo_fesd.mpcc.sides import sort_sides
 from pyomo_fesd.mpcc.stationarity import certify
 
 #: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
@@ -37,15 +36,16 @@ class Steps:
     show : callable Step -> None
         called after each NLP and LPEC
     deadline : Deadline
+    built : Built
     """
 
-    def __init__(self, compiled, options, tolerances, run, timer, show, deadline):
+    def __init__(self, compiled, options, tolerances, run, timer, show, deadline, built):
         self._c, self._options, self._tolerances, self.run = compiled, options, tolerances, run
         self._timer, self._show, self._deadline = timer, show, deadline
         timer.start('build')
-        self._sides = sort_sides(compiled)
+        built.prepare(options)
         timer.stop('build')
-        self._built, self._solver = {}, nlp_solver(options.nlp_solver)
+        self._sides, self._built, self._solver = built.sides, built.nlps, nlp_solver(options.nlp_solver)
         self._lpec = Lpec(compiled, self._sides, options.lpec_options.value(), deadline)
 
     # what the algorithm calls

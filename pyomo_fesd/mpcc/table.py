@@ -1,5 +1,7 @@
 """The log that ``tee=True`` prints: one aligned line for each NLP and LPEC."""
 
+from contextlib import contextmanager
+
 #: Columns and their widths, negative for left-aligned.
 COLUMNS = {
     'step': 4,
@@ -16,17 +18,24 @@ COLUMNS = {
 HEADER = ' '.join(f'{name:{"<" if width < 0 else ">"}{abs(width)}}' for name, width in COLUMNS.items())
 
 
+@contextmanager
+def log_streams(tee, path):
+    """The streams ``tee`` and, if a path is given, a file that is open as long as the context."""
+    if path is None:
+        yield tee
+        return
+    with open(path, 'w') as file:
+        yield [*tee, file]
+
+
 class Table:
-    """Prints a run to ``streams``.
+    """Prints a run to ``streams``, a list of text streams."""
 
-    Parameters
-    ----------
-    streams : list of text streams
-    compiled : Compiled
-    """
-
-    def __init__(self, streams, compiled):
+    def __init__(self, streams):
         self._streams, self._number = streams, 0
+
+    def begin(self, compiled):
+        """Print the sizes and the head."""
         c = compiled
         self._print(
             f"mpec_hybrid: {len(c.variables)} variables, {len(c.constraints)} constraints, {len(c.conditions)} pairs"

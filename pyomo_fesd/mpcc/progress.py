@@ -1,0 +1,82 @@
+"""What a callback sees of a run, after every outer iteration."""
+
+import time
+from dataclasses import dataclass, field
+from itertools import count
+
+import numpy as np
+from pyomo.common.collections import ComponentMap
+
+from pyomo_fesd.mpcc.run import Outcome, Stop
+
+
+@dataclass(frozen=True)
+class Progress:
+    """A run after one of its outer iterations.
+
+    Attributes
+    ----------
+    iteration : int
+        of the homotopy, from 1
+    eps : float
+        the relaxation parameter
+    relaxed_objective : float
+        the model's objective at the relaxation's end, which complementarity may still violate
+    incumbent : float or None
+        the objective of the best exactly complementary point; None before there is one
+    certified : bool
+        whether that point is certified
+    nlp_iterations : int
+        so far, in all NLPs
+    seconds : float
+        since ``solve`` was called
+    """
+
+    iteration: int
+    eps: float
+    relaxed_objective: float
+    incumbent: float
+    certified: bool
+    nlp_iterations: int
+    seconds: float
+    _compiled: object = field(repr=False)
+    _w: np.ndarray = field(repr=False)
+
+    def values(self):
+        """ComponentMap from variables to their values at the best point, or before there is one, at the relaxation's end."""
+        c = self._compiled
+        return ComponentMap(zip(c.variables, map(float, c.values(self._w))))
+
+
+def reporter(callback, compiled, started):
+    """What ``HybridSolver`` calls after every outer iteration; a true answer of ``callback`` stops the run.
+
+    Parameters
+    ----------
+    callback : callable Progress -> object, or None
+    started : float
+        value of ``time.perf_counter()`` at the start
+    """
+    numbers = count(1)
+
+    def report(run):
+        if callback is not None and callback(_progress(run, next(numbers), compiled, started)):
+            raise Stop(Outcome.STOPPED)
+
+    return report
+
+
+def _progress(run, iteration, compiled, started):
+    relaxed = next(step for step in reversed(run.steps) if step.kind == 'relaxation')
+    point = run.point
+    return Progress(
+        iteration=iteration,
+        eps=run.eps,
+        relaxed_objective=relaxed.f,
+        incumbent=None if point is None else compiled.objective(point.f),
+        certified=point is not None and point.certificate.certified,
+        nlp_iterations=run.counts.iterations,
+        seconds=time.perf_counter() - started,
+        _compiled=compiled,
+        _w=relaxed.w if point is None else point.w,
+    )
