@@ -11,6 +11,7 @@ from pyomo.common.config import (
     ConfigDict,
     ConfigValue,
     In,
+    NonNegativeInt,
     PositiveFloat,
     PositiveInt,
     document_class_CONFIG,
@@ -38,12 +39,13 @@ from pyomo_fesd.mpcc.compile import Contradiction, compile_problem
 from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.hybrid import HybridSolver
 from pyomo_fesd.mpcc.lpec import Lpec
+from pyomo_fesd.mpcc.multistart import executor_like, solve_many
 from pyomo_fesd.mpcc.problem import read_problem
 from pyomo_fesd.mpcc.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.run import Outcome, Tolerances
 from pyomo_fesd.mpcc.sides import sort_sides
 from pyomo_fesd.mpcc.stationarity import certify as certify_point
-from pyomo_fesd.mpcc.table import Table
+from pyomo_fesd.mpcc.table import StartsTable, Table
 
 #: What each outcome is in Pyomo's words.
 CONDITIONS = {
@@ -96,7 +98,16 @@ class MpecHybridConfig(SolverConfig):
             ('trust_radius', 1.0, PositiveFloat, "trust region Delta of the LPEC, relative for large variables (eq. 17)"),
             ('branch_tol', 1e-9, PositiveFloat, "Ipopt's tol for branch NLPs"),
             ('branch_iterations', 300, PositiveInt, "Ipopt iterations allowed to one branch NLP; a wrong branch burns them all"),
-            ('max_iterations', 20000, PositiveInt, "Ipopt iterations allowed in all"),
+            ('max_iterations', 20000, PositiveInt, "Ipopt iterations allowed in all; with several starts, to each"),
+            ('starts', 1, PositiveInt, "solve from so many points, the first being the model's values, and keep the best"),
+            ('seed', 0, NonNegativeInt, "of the random points: the same seed gives the same points"),
+            (
+                'executor',
+                None,
+                executor_like,
+                "where the starts run: None for one by one in this process, or an executor of concurrent.futures or with its "
+                "methods, e.g. ProcessPoolExecutor() or Dask's client.get_executor()",
+            ),
         ):
             setattr(self, name, self.declare(name, ConfigValue(default=default, domain=domain, description=text)))
         self.user_scaling = self.declare(
@@ -190,7 +201,7 @@ class MpecHybrid(SolverBase):
         Results
             Pyomo's, and in ``extra_info``: ``outcome`` (a sentence), ``stationarity`` ('B' or 'not certified'), ``reason``,
             ``violation``, ``complementarity`` (absolute and ``_scaled``), ``biactive_pairs``, ``nlps``, ``nlp_iterations``,
-            ``lpecs``, ``binaries``, ``eps_last``, ``pairs``, ``missing_values``, ``violated`` (by name), ``steps``
+            ``lpecs``, ``binaries``, ``eps_last``, ``pairs``, ``missing_values``, ``violated`` (by name), ``steps``, ``starts``
 
         Raises
         ------
@@ -216,9 +227,13 @@ class MpecHybrid(SolverBase):
             results.solver_config = config
             return self._deliver(results, config)
         timer.stop('compile')
-        table = Table(config.tee, compiled)
         deadline = Deadline(None if config.time_limit is None else started + config.time_limit)
-        run = HybridSolver(compiled, config, timer, table.row, deadline).solve()
+        if config.starts > 1:
+            table = StartsTable(config.tee, compiled)
+            run = solve_many(compiled, config, timer, table.row, deadline)
+        else:
+            table = Table(config.tee, compiled)
+            run = HybridSolver(compiled, config, timer, table.row, deadline).solve()
         _fill(results, model, compiled, run)
         results.solver_config = config
         results.timing_info.timer = timer
@@ -276,7 +291,7 @@ def _fill(results, model, c, run):
     info.violated = _violated(c, run.w) if run.outcome is Outcome.INFEASIBLE and run.w is not None else []
     if info.violated:
         info.reason = 'largest violations: ' + ', '.join(f'{name} ({amount:.1e})' for name, amount in info.violated)
-    info.steps = run.steps
+    info.steps, info.starts = run.steps, run.starts
 
 
 def _fill_contradiction(results, model, message):
@@ -285,7 +300,7 @@ def _fill_contradiction(results, model, message):
     results.solution_loader = _Nothing(model)
     info = results.extra_info
     info.outcome, info.stationarity, info.reason = Outcome.INFEASIBLE.value, 'not certified', message
-    info.violated, info.steps = [], []
+    info.violated, info.steps, info.starts = [], [], []
     for name in ('violation', 'complementarity', 'violation_scaled', 'complementarity_scaled', 'biactive_pairs', 'eps_last'):
         setattr(info, name, None)
     info.nlps = info.nlp_iterations = info.lpecs = info.binaries = 0

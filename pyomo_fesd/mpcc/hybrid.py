@@ -48,15 +48,17 @@ class HybridSolver:
     show : callable Step -> None
         called after each NLP and LPEC
     deadline : Deadline, optional
+    built : dict, optional
+        where runs of the same problem with the same options and deadline find each other's NLPs
     """
 
-    def __init__(self, compiled, options, timer, show, deadline=None):
+    def __init__(self, compiled, options, timer, show, deadline=None, built=None):
         self._c, self._options = compiled, options
         self._tolerances = Tolerances(
             options.feasibility_tol, options.biactive_tol, options.descent_tol, options.eta_tol, options.trust_radius
         )
         self.run = Run()
-        self._steps = Steps(compiled, options, self._tolerances, self.run, timer, show, deadline or Deadline())
+        self._steps = Steps(compiled, options, self._tolerances, self.run, timer, show, deadline or Deadline(), built)
         self._forms = (options.relaxation,) if options.relaxation != 'auto' else AUTO[compiled.has_objective]
         self._gap = GapTest(options.gap_tol * 1e-2, options.gap_tol)
         self._tried = Counter()

@@ -92,6 +92,8 @@ class Run:
     eps : float
         the last relaxation parameter
     steps : list of Step
+    starts : list of Start
+        where there were several; counts are those of all, everything else is the best one's
     """
 
     outcome: Outcome = None
@@ -100,3 +102,4 @@ class Run:
     counts: Counts = field(default_factory=Counts)
     eps: float = None
     steps: list = field(default_factory=list)
+    starts: list = field(default_factory=list)

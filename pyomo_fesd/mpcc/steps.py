@@ -37,15 +37,17 @@ class Steps:
     show : callable Step -> None
         called after each NLP and LPEC
     deadline : Deadline
+    built : dict, optional
+        the NLPs that other ``Steps`` of the same MPCC, options and deadline have built
     """
 
-    def __init__(self, compiled, options, tolerances, run, timer, show, deadline):
+    def __init__(self, compiled, options, tolerances, run, timer, show, deadline, built=None):
         self._c, self._options, self._tolerances, self.run = compiled, options, tolerances, run
         self._timer, self._show, self._deadline = timer, show, deadline
         timer.start('build')
         self._sides = sort_sides(compiled)
         timer.stop('build')
-        self._built, self._solver = {}, nlp_solver(options.nlp_solver)
+        self._built, self._solver = {} if built is None else built, nlp_solver(options.nlp_solver)
         self._lpec = Lpec(compiled, self._sides, options.lpec_options.value(), deadline)
 
     # what the algorithm calls
