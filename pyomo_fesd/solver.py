@@ -21,6 +21,7 @@ from pyomo_fesd.mpcc.config import MpecHybridConfig
 from pyomo_fesd.mpcc.hybrid import HybridSolver
 from pyomo_fesd.mpcc.instance import Instance, kept_instance
 from pyomo_fesd.mpcc.lpec import Lpec
+from pyomo_fesd.mpcc.multistart import Multistart
 from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.mpcc.problem import read_problem
 from pyomo_fesd.mpcc.progress import reporter
@@ -30,7 +31,7 @@ from pyomo_fesd.mpcc.run import Outcome, Run, Tolerances
 from pyomo_fesd.mpcc.sides import sort_sides
 from pyomo_fesd.mpcc.source import Contradiction
 from pyomo_fesd.mpcc.stationarity import certify as certify_point
-from pyomo_fesd.mpcc.table import Table, log_streams
+from pyomo_fesd.mpcc.table import StartsTable, Table, log_streams
 
 
 @document_class_CONFIG(methods=['solve'])
@@ -91,7 +92,7 @@ class MpecHybrid(SolverBase):
         Results
             Pyomo's, and in ``extra_info``: ``outcome`` (a sentence), ``stationarity`` ('B' or 'not certified'), ``reason``,
             ``violation``, ``complementarity`` (absolute and ``_scaled``), ``biactive_pairs``, ``nlps``, ``nlp_iterations``,
-            ``lpecs``, ``binaries``, ``eps_last``, ``pairs``, ``missing_values``, ``violated`` (by name), ``steps``
+            ``lpecs``, ``binaries``, ``eps_last``, ``pairs``, ``missing_values``, ``violated`` (by name), ``steps``, ``starts``
 
         Raises
         ------
@@ -110,7 +111,8 @@ class MpecHybrid(SolverBase):
         results.solver_config = config
         with Record(config.json_file, results, config) as record, log_streams(config.tee, config.log_file) as streams:
             StaleFlagManager.mark_all_as_stale()
-            table = Table(streams)
+            several = config.starts > 1
+            table = (StartsTable if several else Table)(streams)
             try:
                 instance = self._ready(model, config)
             except Contradiction as error:
@@ -120,21 +122,26 @@ class MpecHybrid(SolverBase):
                 table.begin(compiled)
                 instance.deadline.at = None if config.time_limit is None else started + config.time_limit
                 after = reporter(config.callback, compiled, started)
-                hybrid = HybridSolver(compiled, config, config.timer, table.row, instance.deadline, after, instance.built)
-                record.run = hybrid.run
-                fill(results, model, hybrid.solve(), compiled)
+                algorithm = Multistart if several else HybridSolver
+                solver = algorithm(compiled, config, config.timer, table.row, instance.deadline, after, instance.built)
+                record.run = solver.run
+                fill(results, model, solver.solve(), compiled)
             results.timing_info.wall_time = time.perf_counter() - started
             table.end(results)
         return self._deliver(results, config)
 
     def _ready(self, model, config):
-        """The model compiled: now, or by ``set_instance`` and up to date."""
+        """The model compiled, now, or by ``set_instance`` and up to date, and its sides sorted."""
         if self._instance is not None and self._instance.model is model:
+            instance = self._instance
             with phase(config.timer, 'refresh'):
-                self._instance.refresh()
-            return self._instance
-        with phase(config.timer, 'compile'), PauseGC():
-            return Instance(model, config, config.timer)
+                instance.refresh()
+        else:
+            with phase(config.timer, 'compile'), PauseGC():
+                instance = Instance(model, config, config.timer)
+        with phase(config.timer, 'build'):
+            instance.built.prepare(config)
+        return instance
 
     def _configure(self, kwds):
         """Options of this call; those in ``solver_options`` (``options`` in the legacy interface) are ours as well."""

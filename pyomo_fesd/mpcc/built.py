@@ -32,7 +32,10 @@ class Built:
         self.sides, self.nlps = None, {}
 
     def prepare(self, options):
-        """Sort the sides for the present bounds and parameters; what was built for others, or with other options, is dropped."""
+        """Sort the sides for the present bounds and parameters; what was built for others, or with other options, is dropped.
+
+        It comes before a run, and once before many starts: they share the bounds, and so the sides.
+        """
         sides, wishes = sort_sides(self._c), {name: options.get(name).value() for name in BUILT_IN}
         if self.sides is None or wishes != self._options or not sides.same_rows(self.sides):
             self.sides, self._options = sides, wishes

@@ -1,6 +1,15 @@
 """The options of ``mpec_hybrid``, one row each: name, default, domain, meaning."""
 
-from pyomo.common.config import ConfigDict, ConfigValue, In, Path, PositiveFloat, PositiveInt, document_configdict
+from pyomo.common.config import (
+    ConfigDict,
+    ConfigValue,
+    In,
+    NonNegativeInt,
+    Path,
+    PositiveFloat,
+    PositiveInt,
+    document_configdict,
+)
 from pyomo.contrib.solver.common.config import SolverConfig
 
 from pyomo_fesd.mpcc.relaxation import RELAXATIONS
@@ -10,6 +19,13 @@ def function(given):
     """Domain of options that are called."""
     if not callable(given):
         raise ValueError(f"not callable: {given!r}")
+    return given
+
+
+def executor(given):
+    """Domain of the option ``executor``: what has the methods of ``concurrent.futures.Executor``."""
+    if not callable(getattr(given, 'submit', None)):
+        raise ValueError("not an executor: it has no method 'submit' as those of concurrent.futures have")
     return given
 
 
@@ -29,7 +45,7 @@ OPTIONS = (
         False,
         bool,
         "begin at the branch that the values in the model name; if its solution is certified, the run ends there, at the local "
-        "solution next to the start, without a homotopy",
+        "solution next to the start, without a homotopy; of several starts only the first does so",
     ),
     (
         'nlp_solver',
@@ -48,14 +64,23 @@ OPTIONS = (
     ('trust_radius', 1.0, PositiveFloat, "trust region Delta of the LPEC, relative for large variables (eq. 17)"),
     ('branch_tol', 1e-9, PositiveFloat, "Ipopt's tol for branch NLPs"),
     ('branch_iterations', 300, PositiveInt, "Ipopt iterations allowed to one branch NLP; a wrong branch burns them all"),
-    ('max_iterations', 20000, PositiveInt, "Ipopt iterations allowed in all"),
+    ('max_iterations', 20000, PositiveInt, "Ipopt iterations allowed in all; with several starts, to each"),
+    ('starts', 1, PositiveInt, "solve from so many points, the first being the model's values, and keep the best"),
+    ('seed', 0, NonNegativeInt, "of the random points: the same seed gives the same points"),
+    (
+        'executor',
+        None,
+        executor,
+        "where the starts run: None for one by one in this process, or an executor of concurrent.futures or with its "
+        "methods, e.g. ProcessPoolExecutor() or Dask's client.get_executor()",
+    ),
     ('user_scaling', True, bool, "honour Pyomo's scaling_factor suffixes"),
     (
         'callback',
         None,
         function,
         "called after every relaxation, and what it led to, with a Progress; if it returns something true, the run ends with the "
-        "best point so far",
+        "best point so far; not together with an executor",
     ),
     ('log_file', None, Path(), "file for the log that tee=True prints, whether or not tee is on"),
     ('json_file', None, Path(), "file for a record of the run, also of one that fails: attach it to a bug report"),

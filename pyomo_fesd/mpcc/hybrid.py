@@ -10,8 +10,6 @@ from collections import Counter
 import numpy as np
 
 from pyomo_fesd.mpcc.active_set import active_sets
-from pyomo_fesd.mpcc.built import Built
-from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.gap import GapTest
 from pyomo_fesd.mpcc.recovery import LADDER
 from pyomo_fesd.mpcc.run import Outcome, Point, Run, Stop, Tolerances
@@ -48,22 +46,21 @@ class HybridSolver:
     timer : HierarchicalTimer
     show : callable Step -> None
         called after each NLP and LPEC
-    deadline : Deadline, optional
-    after : callable Run -> None, optional
+    deadline : Deadline
+    after : callable Run -> None
         called after every outer iteration; may raise Stop
-    built : Built, optional
-        from earlier runs on the same compiled MPCC
+    built : Built
+        prepared for these options; shared with other runs on the same compiled MPCC and deadline
     """
 
-    def __init__(self, compiled, options, timer, show, deadline=None, after=None, built=None):
+    def __init__(self, compiled, options, timer, show, deadline, after, built):
         self._c, self._options = compiled, options
         self._tolerances = Tolerances(
             options.feasibility_tol, options.biactive_tol, options.descent_tol, options.eta_tol, options.trust_radius
         )
         self.run = Run()
-        self._after = after or (lambda run: None)
-        built = built or Built(compiled)
-        self._steps = Steps(compiled, options, self._tolerances, self.run, timer, show, deadline or Deadline(), built)
+        self._after = after
+        self._steps = Steps(compiled, options, self._tolerances, self.run, timer, show, deadline, built)
         self._forms = (options.relaxation,) if options.relaxation != 'auto' else AUTO[compiled.has_objective]
         self._gap = GapTest(options.gap_tol * 1e-2, options.gap_tol)
         self._tried = Counter()

@@ -2,7 +2,6 @@
 
 import time
 from dataclasses import dataclass, field
-from itertools import count
 
 import numpy as np
 from pyomo.common.collections import ComponentMap
@@ -16,22 +15,25 @@ class Progress:
 
     Attributes
     ----------
+    start : int
+        the number of the start; 0 is the model's own values
     iteration : int
-        of the homotopy, from 1
+        of this start's homotopy, from 1
     eps : float
         the relaxation parameter
     relaxed_objective : float
         the model's objective at the relaxation's end, which complementarity may still violate
     incumbent : float or None
-        the objective of the best exactly complementary point; None before there is one
+        the objective of the best exactly complementary point of this start; None before there is one
     certified : bool
         whether that point is certified
     nlp_iterations : int
-        so far, in all NLPs
+        so far, in all NLPs of this start
     seconds : float
         since ``solve`` was called
     """
 
+    start: int
     iteration: int
     eps: float
     relaxed_objective: float
@@ -57,20 +59,20 @@ def reporter(callback, compiled, started):
     started : float
         value of ``time.perf_counter()`` at the start
     """
-    numbers = count(1)
 
-    def report(run):
-        if callback is not None and callback(_progress(run, next(numbers), compiled, started)):
+    def report(run, start=0):
+        if callback is not None and callback(_progress(run, start, compiled, started)):
             raise Stop(Outcome.STOPPED)
 
     return report
 
 
-def _progress(run, iteration, compiled, started):
-    relaxed = next(step for step in reversed(run.steps) if step.kind == 'relaxation')
-    point = run.point
+def _progress(run, start, compiled, started):
+    relaxations, point = [step for step in run.steps if step.kind == 'relaxation'], run.point
+    relaxed = relaxations[-1]
     return Progress(
-        iteration=iteration,
+        start=start,
+        iteration=len(relaxations),
         eps=run.eps,
         relaxed_objective=relaxed.f,
         incumbent=None if point is None else compiled.objective(point.f),

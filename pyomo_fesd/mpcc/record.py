@@ -4,7 +4,7 @@ import json
 import math
 import platform
 import traceback
-from dataclasses import fields
+from dataclasses import asdict, fields
 from importlib.metadata import version
 
 import numpy as np
@@ -65,6 +65,7 @@ class Record:
             'results': {name: info.get(name).value() for name in INFO if name in info},
             'seconds': None if timer is None else _phases(timer),
             'steps': [] if self.run is None else [{name: getattr(step, name) for name in STEP} for step in self.run.steps],
+            'starts': [] if self.run is None else [asdict(start) for start in self.run.starts],
         }
 
 

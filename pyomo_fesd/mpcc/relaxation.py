@@ -125,11 +125,10 @@ class Penalty(Relaxation):
         self._rho = self.START
 
     def solve(self, w, eps, duals=None):
-        """Solve from ``w`` with the weight that brings every product to ``eps``."""
-        spent = 0
+        """Solve from ``w`` with the weight that brings every product to ``eps``; without multipliers a new path begins."""
         if duals is None:
-            # a new path begins
             self._rho = self.START
+        spent = 0
         while True:
             result = super().solve(w, 1 / self._rho, duals)
             spent += result.iterations

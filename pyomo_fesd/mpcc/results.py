@@ -47,7 +47,7 @@ def fill(results, model, run, compiled=None, reason=''):
     if run.point is not None and compiled.has_objective:
         results.incumbent_objective = compiled.objective(run.point.f)
     info = results.extra_info
-    info.outcome, info.steps, info.eps_last = run.outcome.value, run.steps, run.eps
+    info.outcome, info.steps, info.starts, info.eps_last = run.outcome.value, run.steps, run.starts, run.eps
     info.nlps, info.nlp_iterations = run.counts.nlps, run.counts.iterations
     info.lpecs, info.binaries = run.counts.lpecs, run.counts.binaries
     info.pairs = None if compiled is None else len(compiled.conditions)

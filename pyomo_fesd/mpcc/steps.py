@@ -10,6 +10,7 @@ from pyomo_fesd.mpcc.branch import Branch
 from pyomo_fesd.mpcc.feasibility import Feasibility
 from pyomo_fesd.mpcc.lpec import Lpec
 from pyomo_fesd.mpcc.nlp import nlp_solver
+from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.mpcc.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.run import Outcome, Step, Stop
 from pyomo_fesd.mpcc.stationarity import certify
@@ -37,14 +38,12 @@ class Steps:
         called after each NLP and LPEC
     deadline : Deadline
     built : Built
+        prepared for these options
     """
 
     def __init__(self, compiled, options, tolerances, run, timer, show, deadline, built):
         self._c, self._options, self._tolerances, self.run = compiled, options, tolerances, run
         self._timer, self._show, self._deadline = timer, show, deadline
-        timer.start('build')
-        built.prepare(options)
-        timer.stop('build')
         self._sides, self._built, self._solver = built.sides, built.nlps, nlp_solver(options.nlp_solver)
         self._lpec = Lpec(compiled, self._sides, options.lpec_options.value(), deadline)
 
@@ -128,11 +127,8 @@ class Steps:
     def _timed(self, kind):
         """Check the limits, then time what follows; gives the time at which it began."""
         self._check_limits()
-        self._timer.start(kind)
-        try:
+        with phase(self._timer, kind):
             yield time.perf_counter()
-        finally:
-            self._timer.stop(kind)
 
     def _check_limits(self):
         if self._deadline.expired():
