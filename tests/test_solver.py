@@ -6,6 +6,7 @@ import signal
 import threading
 import time
 
+import numpy as np
 import oscillator
 import pyomo.environ as pyo
 import pytest
@@ -236,6 +237,42 @@ def test_an_iteration_limit_keeps_the_best_point():
     assert results.termination_condition is TerminationCondition.iterationLimit
     assert results.solution_status is SolutionStatus.feasible
     assert pyo.value(m.f) == pytest.approx(best, abs=1e-8)
+
+
+def test_a_branch_solution_at_the_iteration_limit_is_kept_and_certified():
+    m, best = small_mpccs.scholtes4()
+    steps = SolverFactoryV2('mpec_hybrid').solve(small_mpccs.scholtes4()[0]).extra_info.steps
+    first = [step.kind for step in steps].index('certificate')
+    options = {'max_iterations': sum(s.iterations for s in steps[:first]), 'raise_exception_on_nonoptimal_result': False}
+    results = SolverFactoryV2('mpec_hybrid').solve(m, **options)
+    assert results.extra_info.nlp_iterations == options['max_iterations']
+    assert results.solution_status in (SolutionStatus.feasible, SolutionStatus.optimal)
+    assert results.extra_info.stationarity == 'B'
+    assert pyo.value(m.f) == pytest.approx(best, abs=1e-8)
+
+
+class LateBranch(io.StringIO):
+    """The time runs out with the line of the first branch."""
+
+    def write(self, text):
+        if ' branch ' in text:
+            time.sleep(3)
+        return super().write(text)
+
+
+@pytest.mark.parametrize('dual, stationarity', [(True, 'B'), (False, 'not certified')])
+def test_a_branch_solution_at_the_time_limit_is_kept(monkeypatch, dual, stationarity):
+    """Certified if weak duality is enough, uncertified if HiGHS would have needed time."""
+    monkeypatch.setattr('pyomo_fesd.mpcc.lpec.ATTEMPTS', ())
+    if not dual:
+        monkeypatch.setattr('pyomo_fesd.mpcc.lpec.lower_bound', lambda *program: -np.inf)
+    m = small_mpccs.badly_scaled()[0]
+    options = {'time_limit': 3, 'raise_exception_on_nonoptimal_result': False}
+    results = SolverFactoryV2('mpec_hybrid').solve(m, tee=LateBranch(), **options)
+    assert results.termination_condition is TerminationCondition.maxTimeLimit
+    assert results.solution_status is SolutionStatus.feasible
+    assert results.extra_info.stationarity == stationarity
+    assert at_a_minimum(m)
 
 
 def disjunction(m):
