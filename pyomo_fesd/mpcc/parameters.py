@@ -70,6 +70,7 @@ class Handles:
 
     Attributes
     ----------
+    parameters : list of VarData and ParamData
     variables : list of VarData
         one for each parameter, in their order
     asleep : list
@@ -77,6 +78,7 @@ class Handles:
     """
 
     def __init__(self, parameters, block=None):
+        self.parameters = parameters
         self._stand_in, self._source, self.asleep = {}, ComponentMap(), []
         if block is not None:
             block.stand_in, block.row = VarList(), ConstraintList()
