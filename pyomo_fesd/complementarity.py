@@ -7,7 +7,6 @@ equation to every condition and refuses forms that people write.  Here the argum
 from typing import NamedTuple
 
 from pyomo.common.numeric_types import native_numeric_types
-from pyomo.core import value
 from pyomo.core.expr import EqualityExpression, InequalityExpression, RangedExpression
 
 from pyomo_fesd.errors import FesdError
@@ -42,8 +41,8 @@ def _is_constant(expr):
 
 
 def _difference(a, b):
-    """``a - b`` without a trailing ``- 0``."""
-    return a if _is_constant(b) and value(b) == 0 else a - b
+    """``a - b`` without a trailing ``- 0``; a mutable Param stays, its value may change."""
+    return a if b.__class__ in native_numeric_types and b == 0 else a - b
 
 
 def side(arg):

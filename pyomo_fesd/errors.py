@@ -15,3 +15,7 @@ class FesdError(PyomoException):
         self.cause = cause
         self.fix = fix
         super().__init__(f"{self.component}: {cause}\n    Fix: {fix}")
+
+    def __reduce__(self):
+        # an exception is pickled with its message alone, which does not make another one
+        return type(self), (self.component, self.cause, self.fix)

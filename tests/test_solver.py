@@ -4,7 +4,9 @@ import io
 import os
 import signal
 import threading
+import time
 
+import numpy as np
 import oscillator
 import pyomo.environ as pyo
 import pytest
@@ -184,6 +186,93 @@ def test_ctrl_c_during_an_nlp_ends_with_a_result():
     results = pyo.SolverFactory('mpec_hybrid').solve(m, tee=PressWhenTheTableBegins(), options=options)
     assert results.solver.termination_condition == pyo.TerminationCondition.resourceInterrupt
     assert set(m.component_map()) == names
+
+
+class Press(io.StringIO):
+    """Does something, Ctrl-C if nothing else, with the line of the log after the first certificate."""
+
+    def __init__(self, act=lambda: os.kill(os.getpid(), signal.SIGINT)):
+        super().__init__()
+        self._act, self._certified = act, False
+
+    def write(self, text):
+        if self._certified:
+            self._certified = False
+            self._act()
+        self._certified = self._certified or 'certificate' in text
+        return super().write(text)
+
+
+def at_a_minimum(m):
+    """Whether the model stands at a minimum of ``small_mpccs.badly_scaled``, whose homotopy goes on after the first certificate."""
+    return min(abs(m.x.value - 0.01) + abs(m.y.value), abs(m.x.value) + abs(m.y.value - 1)) < 1e-8
+
+
+@pytest.mark.parametrize('interface', [pyo.SolverFactory, SolverFactoryV2])
+def test_ctrl_c_keeps_the_best_point(interface):
+    m = small_mpccs.badly_scaled()[0]
+    results = interface('mpec_hybrid').solve(m, tee=Press(), raise_exception_on_nonoptimal_result=False)
+    info = results.solver if interface is pyo.SolverFactory else results.extra_info
+    assert info.outcome == 'interrupted'
+    assert info.stationarity == 'B'
+    assert at_a_minimum(m)
+
+
+def test_a_time_limit_keeps_the_best_point():
+    m = small_mpccs.badly_scaled()[0]
+    options = {'time_limit': 5, 'raise_exception_on_nonoptimal_result': False}
+    results = SolverFactoryV2('mpec_hybrid').solve(m, tee=Press(lambda: time.sleep(5)), **options)
+    assert results.termination_condition is TerminationCondition.maxTimeLimit
+    assert results.solution_status is SolutionStatus.feasible
+    assert at_a_minimum(m)
+
+
+def test_an_iteration_limit_keeps_the_best_point():
+    m, best = small_mpccs.scholtes4()
+    steps = SolverFactoryV2('mpec_hybrid').solve(small_mpccs.scholtes4()[0]).extra_info.steps
+    first = [step.kind for step in steps].index('certificate')
+    # one more than it took to get there: the relaxation after it is the last
+    options = {'max_iterations': sum(s.iterations for s in steps[:first]) + 1, 'raise_exception_on_nonoptimal_result': False}
+    results = SolverFactoryV2('mpec_hybrid').solve(m, **options)
+    assert results.termination_condition is TerminationCondition.iterationLimit
+    assert results.solution_status is SolutionStatus.feasible
+    assert pyo.value(m.f) == pytest.approx(best, abs=1e-8)
+
+
+def test_a_branch_solution_at_the_iteration_limit_is_kept_and_certified():
+    m, best = small_mpccs.scholtes4()
+    steps = SolverFactoryV2('mpec_hybrid').solve(small_mpccs.scholtes4()[0]).extra_info.steps
+    first = [step.kind for step in steps].index('certificate')
+    options = {'max_iterations': sum(s.iterations for s in steps[:first]), 'raise_exception_on_nonoptimal_result': False}
+    results = SolverFactoryV2('mpec_hybrid').solve(m, **options)
+    assert results.extra_info.nlp_iterations == options['max_iterations']
+    assert results.solution_status in (SolutionStatus.feasible, SolutionStatus.optimal)
+    assert results.extra_info.stationarity == 'B'
+    assert pyo.value(m.f) == pytest.approx(best, abs=1e-8)
+
+
+class LateBranch(io.StringIO):
+    """The time runs out with the line of the first branch."""
+
+    def write(self, text):
+        if ' branch ' in text:
+            time.sleep(3)
+        return super().write(text)
+
+
+@pytest.mark.parametrize('dual, stationarity', [(True, 'B'), (False, 'not certified')])
+def test_a_branch_solution_at_the_time_limit_is_kept(monkeypatch, dual, stationarity):
+    """Certified if weak duality is enough, uncertified if HiGHS would have needed time."""
+    monkeypatch.setattr('pyomo_fesd.mpcc.lpec.ATTEMPTS', ())
+    if not dual:
+        monkeypatch.setattr('pyomo_fesd.mpcc.lpec.lower_bound', lambda *program: -np.inf)
+    m = small_mpccs.badly_scaled()[0]
+    options = {'time_limit': 3, 'raise_exception_on_nonoptimal_result': False}
+    results = SolverFactoryV2('mpec_hybrid').solve(m, tee=LateBranch(), **options)
+    assert results.termination_condition is TerminationCondition.maxTimeLimit
+    assert results.solution_status is SolutionStatus.feasible
+    assert results.extra_info.stationarity == stationarity
+    assert at_a_minimum(m)
 
 
 def disjunction(m):

@@ -1,40 +1,21 @@
 """An MPCC compiled once: Pyomo's NL writer -> casadi -> SX functions with exact sparse derivatives.
 
 The NL file holds the model's own rows, then one row for every side of a pair that is not a plain variable, one for every
-decision and one for every penalty term.  Relaxations, branches and the LPEC are all formed from the same SX graph, so neither
-eps nor a branch needs a rebuild.
+decision and one for every penalty term (``scratch``).  casadi reads it (``nl_file``), each of these is found again (``layout``),
+and all of it becomes one scaled function (``assemble``).  Relaxations, branches and the LPEC are all formed from the same SX
+graph, so neither eps nor a branch needs a rebuild.
 """
 
-import os
-import tempfile
-from contextlib import contextmanager
-
-import casadi as ca
-import numpy as np
-from pyomo.common.collections import ComponentMap
 from pyomo.common.errors import InfeasibleConstraintException
-from pyomo.common.modeling import unique_component_name
-from pyomo.core import Block, ConstraintList, Objective, Suffix, VarList, maximize, quicksum, value
-from pyomo.core.expr import Expr_ifExpression, ExternalFunctionExpression, UnaryFunctionExpression
-from pyomo.repn import generate_standard_repn
-from pyomo.repn.plugins.nl_writer import NLWriter
 
-from pyomo_fesd.errors import FesdError
-from pyomo_fesd.mpcc.compiled import Compiled, Numbers, csr
+from pyomo_fesd.mpcc import nl_file
+from pyomo_fesd.mpcc.assemble import assemble
 from pyomo_fesd.mpcc.parameters import symbols
-from pyomo_fesd.mpcc.problem import Condition
-from pyomo_fesd.mpcc.scaling import Scale, UserFactors, side_factors
+from pyomo_fesd.mpcc.phase import phase
+from pyomo_fesd.mpcc.scaling import UserFactors
+from pyomo_fesd.mpcc.scratch import entries_of
+from pyomo_fesd.mpcc.source import Contradiction
 from pyomo_fesd.timeindex import refuse_foreign
-
-#: Nodes that casadi's NL reader cannot evaluate.
-UNSUPPORTED_NODES = (ExternalFunctionExpression, Expr_ifExpression)
-#: A bound that no sum reaches.
-ALWAYS = 1e300
-UNSUPPORTED_FUNCTIONS = ('asinh', 'acosh', 'atanh')
-
-
-class Contradiction(Exception):
-    """The NL writer found a constraint that no value of the free variables can meet; the message names it."""
 
 
 def compile_problem(problem, timer, folder=None, parameters=(), user_scaling=True):
@@ -59,261 +40,20 @@ def compile_problem(problem, timer, folder=None, parameters=(), user_scaling=Tru
         where fixed values alone violate a constraint
     """
     factors = UserFactors(problem.model, user_scaling)
-    with symbols(problem.model, parameters) as handles, _sides(problem, handles) as (scratch, rows, conditions):
-        timer.start('write')
-        try:
-            with tempfile.TemporaryDirectory() as temporary:
-                path = os.path.join(folder or temporary, 'model.nl')
-                with open(path, 'w', newline='') as stream:
-                    info = _write(problem.model, stream)
-                timer.stop('write')
-                refuse_foreign(info.variables, problem.model.model(), problem.model)
-                timer.start('import')
-                nl = _import(problem.model, path)
-        except InfeasibleConstraintException as error:
-            raise Contradiction(str(error)) from None
-        compiled = _assemble(problem, conditions, rows, info, nl, handles, factors)
-        timer.stop('import')
-    return compiled
+    with symbols(problem.model, parameters) as handles, entries_of(problem, handles) as entries:
+        nl = _through_file(problem.model, handles, timer, folder)
+        with phase(timer, 'assemble'):
+            return assemble(problem, entries, nl, handles, factors)
 
 
-@contextmanager
-def _sides(problem, handles):
-    """A scratch block with a row for every expression that the MPCC needs; the pairs sleep while it exists."""
-    model, scratch = problem.model, Block()
-    model.add_component(unique_component_name(model, '_pyomo_fesd_scratch'), scratch)
-    asleep = _sleep(problem.sources)
-    suffixes = [s for s in model.component_objects(Suffix, active=True, descend_into=Block) if s.export_enabled()]
-    for suffix in suffixes:
-        suffix.deactivate()
-    try:
-        scratch.row = ConstraintList()
-        scratch.part = VarList()
-        if problem.objective is None:
-            scratch.objective = Objective(expr=0)
-        conditions = problem.conditions + [c for source, m in problem.mixed for c in _split(scratch, source, m)]
-        known = {}
-        rows = {
-            'G': [_shared_row(scratch, handles.in_terms(c.G), known) for c in conditions],
-            'H': [_shared_row(scratch, handles.in_terms(c.H), known) for c in conditions],
-            'eta': [_row(scratch, d.eta) for d in problem.decisions],
-            'equal': [_row(scratch, d.constraint.body - d.constraint.upper) for d in problem.decisions],
-            'penalty': [_row(scratch, weight * term.expr) for term, weight in problem.penalties],
-            'present': _presence(scratch, handles),
-        }
-        rows['present'] += [_keep(scratch, rows['G'] + rows['H'])]
-        yield scratch, rows, conditions
-    finally:
-        model.del_component(scratch)
-        for suffix in suffixes:
-            suffix.activate()
-        _wake(asleep)
-
-
-def _presence(scratch, handles):
-    """Parameters that stand nowhere must be in the NL file all the same."""
-    return [_keep(scratch, handles.variables)]
-
-
-def _keep(scratch, components):
-    """A row that keeps variables in the NL file which stand in no other: the writer drops those."""
-    variables = [c for c in components if hasattr(c, 'is_variable_type') and c.is_variable_type()]
-    return scratch.row.add(quicksum(variables) <= ALWAYS) if variables else 0.0
-
-
-def _sleep(sources):
-    """Deactivate the components of all ``sources``, which the NL writer refuses; returns what ``_wake`` needs."""
-    components = ComponentMap()
-    for source in sources:
-        components.setdefault(source.parent_component(), []).append(source)
-    for component in components:
-        component.deactivate()
-    return components
-
-
-def _wake(components):
-    for component, datas in components.items():
-        component._active = True
-        for data in datas:
-            data.activate()
-
-
-def _split(scratch, source, m):
-    """l <= B <= u perp F as B - l perp F+ and u - B perp F- with F = F+ - F-."""
-    plus, minus = scratch.part.add(), scratch.part.add()
-    for part, now in ((plus, max(value(m.F, exception=False) or 0, 0)), (minus, max(-(value(m.F, exception=False) or 0), 0))):
-        part.setlb(0)
-        part.value = now
-    scratch.row.add(m.F == plus - minus)
-    return [Condition(source, m.body - m.lower, plus), Condition(source, m.upper - m.body, minus)]
-
-
-def _shared_row(scratch, expr, known):
-    """As ``_row``, one for a side that stands in several pairs: its branch equation must not appear twice."""
-    if id(expr) not in known:
-        known[id(expr)] = _row(scratch, expr)
-    return known[id(expr)]
-
-
-def _row(scratch, expr):
-    """What stands for ``expr`` in the NL file: a number, a variable, or a row."""
-    if not hasattr(expr, 'is_fixed'):
-        return value(expr)
-    if expr.is_fixed():
-        # 0 * x is fixed although x may have no value
-        return generate_standard_repn(expr, compute_values=True).constant
-    if expr.is_variable_type():
-        return expr
-    return scratch.row.add(expr >= 0)
-
-
-def _number(k, r, place, column):
-    """Equal for equal sides: the row, the variable counted behind all rows, or for the k-th side, a constant, -1 - k."""
-    if _is_row(r):
-        return place[r]
-    return len(place) + column[r] if r in column else -1 - k
-
-
-def _is_row(r):
-    return hasattr(r, 'body')
-
-
-def _write(model, stream):
-    return NLWriter().write(model, stream, linear_presolve=False, scale_model=False, symbolic_solver_labels=False)
-
-
-def _import(model, path):
-    builder = ca.NlpBuilder()
-    try:
-        builder.import_nl(path)
-    except RuntimeError as error:
-        raise _unsupported(model, error) from None
-    return builder
-
-
-def _unsupported(model, error):
-    """Name the component whose expression casadi could not read."""
-    for component in model.component_data_objects(descend_into=Block, active=True):
-        expr = getattr(component, 'expr', None)
-        if expr is None or not hasattr(expr, 'is_expression_type'):
-            continue
-        for node in _nodes(expr):
-            if isinstance(node, UNSUPPORTED_NODES) or (
-                isinstance(node, UnaryFunctionExpression) and node.getname() in UNSUPPORTED_FUNCTIONS
-            ):
-                return FesdError(
-                    component,
-                    f"the function '{node.getname()}' cannot be evaluated here",
-                    "write it with exp, log, sqrt or a complementarity (for if-then-else: a Disjunction)",
-                )
-    return FesdError(model, f"casadi cannot read the model: {str(error).splitlines()[-1]}", "report this model")
-
-
-def _nodes(expr):
-    stack = [expr]
-    while stack:
-        node = stack.pop()
-        if hasattr(node, 'is_expression_type') and node.is_expression_type():
-            yield node
-            stack.extend(node.args)
-
-
-def _assemble(problem, conditions, rows, info, nl, handles, factors):
-    """Split the NL's rows into the model's own and those that we asked for, as one scaled function."""
-    columns = ComponentMap((v, j) for j, v in enumerate(info.variables))
-    place = ComponentMap((c, i) for i, c in enumerate(info.constraints))
-    lower, upper = np.array(nl.g_lb, dtype=float), np.array(nl.g_ub, dtype=float)
-    settable = [columns[v] for v in handles.variables]
-    free = np.setdiff1d(np.arange(len(info.variables)), settable)
-    variables = [info.variables[j] for j in free]
-
-    taken = {place[r] for group in rows.values() for r in group if _is_row(r)}
-    own = [i for i in range(len(info.constraints)) if i not in taken]
-    constraints = [handles.source(info.constraints[i]) for i in own]
-    sources = [c.source for c in conditions]
-
-    # the solver's variables, and the model's in terms of them
-    s_x, s_g = factors.of(variables), factors.of(constraints)
-    s_f = float(factors.of([problem.objective])[0])
-    w, p = ca.SX.sym('w', len(variables)), ca.SX.sym('p', len(settable))
-    x = ca.SX(len(info.variables), 1)
-    x[free.tolist()], x[settable] = w / s_x, p
-    f, g = ca.Function('nl', [ca.vertcat(*nl.x)], [nl.f, ca.vertcat(*nl.g)]).expand()(x)
-
-    def sx(r):
-        if _is_row(r):
-            # constants of a linear row stand in its bound
-            return g[place[r]] - lower[place[r]]
-        return x[columns[r]] if r in columns else ca.SX(value(r))
-
-    def group(name):
-        return ca.vertcat(*map(sx, rows[name])) if rows[name] else ca.SX(0, 1)
-
-    names = rows['G'] + rows['H']
-    start, missing = _start(variables)
-    sides = ca.vertcat(group('G'), group('H'))
-    s_sides = _scale_sides(sides, w, p, names, start * s_x, handles, dict(zip(free, s_x)), columns, factors.of(sources * 2))
-    q = len(conditions)
-    sides = sides * s_sides
-    penalty = sum(map(sx, rows['penalty']), ca.SX(0))
-    own_rows = g[own] * s_g if own else ca.SX(0, 1)
-    parts = [f * s_f, penalty * s_f, own_rows, sides[:q], sides[q:], group('eta'), group('equal')]
-
-    side_of = np.array([_number(k, r, place, columns) for k, r in enumerate(names)], dtype=int)
-    kept = _distinct(side_of, q)
-    both = np.concatenate([kept, kept + q])
-    parts[3], parts[4] = parts[3][kept.tolist()], parts[4][kept.tolist()]
-    lbx, ubx = np.array(nl.x_lb, dtype=float)[free], np.array(nl.x_ub, dtype=float)[free]
-    plain = ComponentMap((v, j) for j, v in enumerate(variables))
-    for r in names:
-        if not _is_row(r) and r in plain:
-            lbx[plain[r]] = max(lbx[plain[r]], 0.0)
-    guide = np.array([problem.artificial.get(v.parent_component(), np.inf) for v in variables], dtype=float)
-    numbers = Numbers(
-        lbx=lbx * s_x,
-        ubx=ubx * s_x,
-        lbg=lower[own] * s_g,
-        ubg=upper[own] * s_g,
-        side_of=side_of[both],
-        artificial=np.isfinite(guide),
-        guide_ubx=np.minimum(ubx, guide) * s_x,
-        x0=np.clip(start, lbx, ubx) * s_x,
-        parameters=handles.values(),
-        missing=missing,
-        sign=-1.0 if problem.objective is not None and problem.objective.sense == maximize else 1.0,
-        has_objective=problem.objective is not None,
-        scale=Scale(s_x, s_g, s_f, s_sides[both]),
-    )
-    graph = ca.Function('mpcc', [w, p], parts)
-    return Compiled(graph, numbers, variables, constraints, [conditions[k] for k in kept], problem.decisions)
-
-
-def _start(variables):
-    """The variables' values, 0 where there is none, and how many there are not."""
-    start = np.array([np.nan if v.value is None else v.value for v in variables], dtype=float)
-    known = np.isfinite(start)
-    return np.where(known, start, 0.0), int(np.count_nonzero(~known))
-
-
-def _scale_sides(sides, w, p, names, w0, handles, s_x, columns, given):
-    """Factors of the sides: the variable's own for a plain variable, the user's or a mild gradient for an expression."""
-    if not sides.numel():
-        return np.ones(0)
-    J = csr(ca.Function('sides', [w, p], [ca.jacobian(sides, w)])(w0, handles.values()))
-    largest = np.abs(J).max(axis=1).toarray().ravel() if J.shape[1] else np.zeros(J.shape[0])
-    factors = side_factors(np.where(np.isfinite(largest), largest, 0.0), given)
-    for k, r in enumerate(names):
-        if not _is_row(r) and r in columns:
-            factors[k] = s_x.get(columns[r], 1.0)
-    return factors
-
-
-def _distinct(side_of, q):
-    """Positions of the pairs that are not there already, in whichever order of their sides."""
-    seen, kept = set(), []
-    for k in range(q):
-        pair = frozenset((side_of[k], side_of[k + q]))
-        if pair not in seen:
-            kept.append(k)
-        seen.add(pair)
-    return np.array(kept, dtype=int)
+def _through_file(model, handles, timer, folder):
+    """The model, with all that stands on it now, as an ``Nl``."""
+    with nl_file.folder_for(folder) as place:
+        with phase(timer, 'write'):
+            try:
+                path, variables, constraints = nl_file.write(model, place)
+            except InfeasibleConstraintException as error:
+                raise Contradiction(str(error)) from None
+        refuse_foreign(variables, model.model(), model)
+        with phase(timer, 'import'):
+            return nl_file.read(model, handles, path, variables, constraints)

@@ -5,7 +5,7 @@ the model.
 A ``Compiled`` can be pickled and sent to another process: the casadi graph goes along, the Pyomo components do not.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -72,6 +72,8 @@ class Compiled:
     constraints : list of ConstraintData, length m (rows of g)
     conditions : list of Condition, length q
     decisions : list of Decision
+    source : Source
+        where those numbers come from that a new solve reads again
 
     Attributes
     ----------
@@ -80,10 +82,11 @@ class Compiled:
 
     NAMES = ('f', 'penalty', 'g', 'G', 'H', 'eta', 'equal')
 
-    def __init__(self, graph, numbers, variables=(), constraints=(), conditions=(), decisions=()):
+    def __init__(self, graph, numbers, variables=(), constraints=(), conditions=(), decisions=(), source=None):
         self._graph, self._numbers = graph, numbers
         self.__dict__.update(vars(numbers))
         self.variables, self.constraints, self.conditions, self.decisions = variables, constraints, conditions, decisions
+        self._source = source
         self.x, self.p = ca.SX.sym('w', graph.size1_in(0)), ca.SX.sym('p', graph.size1_in(1))
         for name, expression in zip(self.NAMES, graph(self.x, self.p)):
             setattr(self, name, expression)
@@ -103,6 +106,17 @@ class Compiled:
 
     def __setstate__(self, state):
         self.__init__(*state)
+
+    def refresh(self):
+        """Read bounds, start and parameters from the model again; see ``Source.read``."""
+        self._numbers = replace(self._numbers, **self._source.read())
+        self.__dict__.update(vars(self._numbers))
+
+    @property
+    def nonzeros(self):
+        """Entries of the Jacobians, by what they belong to."""
+        names = ('objective', 'constraints', 'G', 'H', 'decisions')
+        return {name: self._gradients.sparsity_out(i).nnz() for i, name in enumerate(names)}
 
     def evaluate(self, w):
         """f, g, G, H and eta at ``w``."""

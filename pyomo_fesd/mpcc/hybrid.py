@@ -1,45 +1,14 @@
 """The hybrid active-set algorithm (theory, section 4): Reg(eps) -> active sets -> branch NLP -> certificate.
 
-Reg(eps) leads; as soon as its active sets look settled, the branch NLP that they name is solved: an exactly complementary point,
-which the LPEC certifies or from which it descends into a better branch.  The homotopy goes on while its objective promises less
-than the incumbent's (gap test), and eps may rise again when a relaxation fails.
+Reg(eps) leads (``Homotopy``); the branches that it names give exactly complementary points, which the LPEC certifies or from which
+it descends into better branches (``Branches``).
 """
 
-from collections import Counter
-
-import numpy as np
-
-from pyomo_fesd.mpcc.active_set import active_sets
-from pyomo_fesd.mpcc.deadline import Deadline
+from pyomo_fesd.mpcc.branches import Branches
 from pyomo_fesd.mpcc.gap import GapTest
-from pyomo_fesd.mpcc.recovery import LADDER
+from pyomo_fesd.mpcc.homotopy import Homotopy
 from pyomo_fesd.mpcc.run import Outcome, Point, Run, Stop, Tolerances
-from pyomo_fesd.mpcc.search import leaves
-from pyomo_fesd.mpcc.stationarity import Stationarity
 from pyomo_fesd.mpcc.steps import Steps
-
-#: A branch NLP's objective must fall by this, relative, to count as descent.
-PROGRESS = 1e-8
-#: Attempts at a branch NLP before it counts as infeasible, and the iterations that the early ones may use.
-TRIES, EARLY = 2, 60
-#: With products below this and the same sides as before, a smaller eps shows nothing new.
-EXHAUSTED = 1e-8
-#: From this eps on a relaxation is worth a branch NLP, which is much cheaper than the next relaxation, unless more than this part
-#: of the pairs could still go either way.
-TELLING, UNDECIDED = 1e-3, 0.5
-#: From this eps on multipliers are carried along; before, Ipopt's own centring finds better minima (time-optimal car, bilevel1).
-CARRIED = 1e-2
-#: More bi-active pairs than this say little, and an LPEC over them takes long.
-SUGGESTED = 50
-#: The trust region of a descent step shrinks by this, so often.
-SHRINK, SHRINKS = 0.1, 3
-#: A feasible point with variables beyond this has run away along an unbounded objective.
-UNBOUNDED = 1e15
-#: Trust region of the LPEC that looks for any feasible branch.
-FAR = 1e3
-#: Without an objective any solution will do, and the elastic form is by far the quickest to one; with an objective it settles
-#: early in worse minima than Scholtes' (gas-liquid optimal control: 250.005 instead of 250).  A failure changes the form.
-AUTO = {False: ('elastic', 'scholtes'), True: ('scholtes', 'elastic')}
 
 
 class HybridSolver:
@@ -53,28 +22,30 @@ class HybridSolver:
     timer : HierarchicalTimer
     show : callable Step -> None
         called after each NLP and LPEC
-    deadline : Deadline, optional
+    deadline : Deadline
+    after : callable Run -> None
+        called after every outer iteration; may raise Stop
+    built : Built
+        prepared for these options; shared with other runs on the same compiled MPCC and deadline
     """
 
-    def __init__(self, compiled, options, timer, show, deadline=None):
+    def __init__(self, compiled, options, timer, show, deadline, after, built):
         self._c, self._options = compiled, options
-        self._tolerances = Tolerances(
+        tolerances = Tolerances(
             options.feasibility_tol, options.biactive_tol, options.descent_tol, options.eta_tol, options.trust_radius
         )
         self.run = Run()
-        self._steps = Steps(compiled, options, self._tolerances, self.run, timer, show, deadline or Deadline())
-        self._forms = (options.relaxation,) if options.relaxation != 'auto' else AUTO[compiled.has_objective]
-        self._gap = GapTest(options.gap_tol * 1e-2, options.gap_tol)
-        self._tried = Counter()
+        self._steps = Steps(compiled, options, tolerances, self.run, timer, show, deadline, built)
+        gap = GapTest(options.gap_tol * 1e-2, options.gap_tol)
+        self._branches = Branches(compiled, self._steps, tolerances, gap, options.lpec == 'full')
+        judge = self._branches if options.mode == 'hybrid' else None
+        self._homotopy = Homotopy(compiled, options, self._steps, gap, judge, after)
 
     def solve(self):
         """Run to a certified point or an honest end; returns the ``Run``."""
         run = self.run
         try:
-            self._homotopy()
-            if run.point is None:
-                self._last_resort()
-            run.outcome = self._verdict()
+            run.outcome = MODES[self._options.mode](self)
         except Stop as stop:
             run.outcome = stop.outcome
         except KeyboardInterrupt:
@@ -83,7 +54,12 @@ class HybridSolver:
             run.w = run.point.w
         return run
 
-    def _verdict(self):
+    def _hybrid(self):
+        """The whole algorithm."""
+        if not (self._options.warm_start and self._from_values()):
+            self._homotopy.follow()
+        if self.run.point is None:
+            self._last_resort()
         point = self.run.point
         if point is None:
             return Outcome.INFEASIBLE
@@ -91,166 +67,28 @@ class HybridSolver:
             return Outcome.FEASIBLE
         return Outcome.CERTIFIED if self._c.has_objective else Outcome.SOLVED
 
-    # the homotopy
+    def _relaxation_only(self):
+        """The homotopy alone, for comparison: nothing is exactly complementary and nothing is certified."""
+        self._homotopy.follow()
+        end = self._homotopy.end
+        if end is None:
+            return Outcome.INFEASIBLE
+        self.run.point = Point(end, self._c.evaluate(end.w).f, self._steps.measure(end))
+        return Outcome.RELAXED
 
-    def _homotopy(self):
-        options = self._options
-        form, ladder = 0, list(LADDER)
-        w, eps, duals, previous = self._c.x0, options.eps_init, None, None
-        while True:
-            self.run.eps = eps
-            relaxed = self._steps.relax(self._forms[form], w, eps, duals if eps <= 1.001 * CARRIED else None)
-            self._keep_least_infeasible(relaxed.w)
-            if not self._steps.usable(relaxed):
-                if not ladder or self._certified_incumbent():
-                    return
-                step = ladder.pop(0)
-                self._steps.note(step.what, relaxed.w)
-                w = step.start(self._c.x0, relaxed.w, self)
-                eps = max(step.eps(options.eps_init, eps, options.eps_factor), options.eps_final)
-                form, duals, previous = (form + step.other_form) % len(self._forms), None, None
-                self._gap.restart()
-                continue
-            w, duals = relaxed.w, relaxed
-            at = self._c.evaluate(w)
-            self._gap.add(eps, at.f)
-            sets = active_sets(at.G, at.H, self._steps.biactive(at))
-            last = eps <= 1.001 * options.eps_final  # products of eps_factor carry round-off
-            exhausted = np.max(at.G * at.H, initial=0.0) <= EXHAUSTED and sets.same_sides(previous)
-            telling = eps <= 1.001 * TELLING and np.count_nonzero(sets.gamma) <= UNDECIDED * len(sets.gamma)
-            if telling or sets.same_sides(previous) or last or not sets.gamma.any():
-                self._explore(relaxed, sets, last or exhausted)
-                if self._settled():
-                    return
-            if last or (exhausted and self._tried[sets.zero.tobytes()] >= TRIES):
-                if self.run.point is not None or form + 1 == len(self._forms):
-                    return
-                # nothing feasible at the end of this form's path: the other form takes another one
-                self._steps.note("nothing feasible on this path, other form", w)
-                w, eps, duals, form, previous = self._c.x0, options.eps_init, None, form + 1, None
-                self._gap.restart()
-                self._tried.clear()
-                continue
-            # nothing changes before eps falls below the largest product
-            biting = min(eps, np.max(at.G * at.H, initial=0.0))
-            previous, eps = sets, max(biting * options.eps_factor, options.eps_final)
-
-    def restore(self, w):
-        """The nearest point that the feasibility phase finds, with pairs as loose as at the start."""
-        return self._steps.restore(w, self._options.eps_init).w
-
-    def _keep_least_infeasible(self, w):
-        """Remember the point to report if nothing feasible is found."""
-        if self.run.w is None or self._steps.violation(w) < self._steps.violation(self.run.w):
-            self.run.w = w
-
-    def _certified_incumbent(self):
+    def _from_values(self):
+        """Whether the branch that the start values name leads to a certified point."""
+        self._steps.keep_least_infeasible(self._c.x0)
+        self._branches.explore_from(self._c.x0, False)
         return self.run.point is not None and self.run.point.certificate.certified
 
-    def _settled(self):
-        return self._certified_incumbent() and self._gap.closed(self.run.point.f)
-
     def _last_resort(self):
-        """Nothing feasible: the LPEC with every pair as a binary names the branch whose linearisation is feasible, if there is one.
+        """Nothing feasible on any path: the branches are searched; at the end the feasibility phase shows what contradicts."""
+        self._branches.search(self.run.w, self._c.x0)
+        if self.run.point is None:
+            self.run.w = self._steps.restore(self.run.w, self._options.eps_final).w
+            self._branches.explore_from(self.run.w, True)
 
-        Otherwise the feasibility phase shows what contradicts.
-        """
-        self._tried.clear()
-        for w in (self.run.w, self._c.x0):
-            sets = active_sets(*self._sides(w), np.inf)
-            step = self._steps.suggestion(w, sets, FAR)
-            if step.solved:
-                self._improve_from(self._point(w + step.d, step.zero, None, True))
-            if self.run.point is not None:
-                return
-        self._steps.note("search over the pairs", self.run.w)
-        for w, zero in leaves(self._c, self._steps.branch, self._c.x0, self._tolerances.feasibility):
-            self._improve_from(self._point(w, zero, None, True))
-            if self.run.point is not None:
-                return
-        self.run.w = self._steps.restore(self.run.w, self._options.eps_final).w
-        self._explore(None, active_sets(*self._sides(self.run.w), self._tolerances.biactive), True)
 
-    # branches
-
-    def _explore(self, relaxed, sets, final):
-        """Solve the branch that the active sets name; descend from it as long as the LPEC shows a way."""
-        zero, w = sets.zero, self.run.w if relaxed is None else relaxed.w
-        point = self._point(w, zero, relaxed, final)
-        if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
-            zero = self._steps.suggestion(w, sets, self._tolerances.radius).zero
-            point = self._point(w, zero, relaxed, final)
-        self._improve_from(point, final)
-
-    def _improve_from(self, point, final=True):
-        """Keep ``point`` and what descends from it, while the homotopy does not promise something much better."""
-        while point is not None:
-            self._keep(point)
-            descends = point.certificate.grade is Stationarity.DESCENT and (final or self._gap.closed(point.f))
-            point = self._descend(point) if descends else None
-
-    def _descend(self, point):
-        """A better point in the branch of the LPEC's direction: from its end, or within ever smaller trust regions."""
-        enough = point.f - PROGRESS * max(1.0, abs(point.f))
-        step, w = point.certificate.lpec, point.w
-        better = self._point(w + step.d, step.zero, None, False)
-        radius = self._tolerances.radius
-        sets = active_sets(*self._sides(w), self._tolerances.biactive)
-        for _ in range(SHRINKS):
-            if better is not None and better.f <= enough:
-                return better
-            radius *= SHRINK
-            step = self._steps.lpec(w, sets, radius, point.equal)
-            if not step.solved or step.value == 0.0:
-                return None
-            reach = radius * np.maximum(1.0, np.abs(w))
-            better = self._certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=EARLY)
-        return better if better is not None and better.f <= enough else None
-
-    def _sides(self, w):
-        at = self._c.evaluate(w)
-        return at.G, at.H
-
-    def _keep(self, point):
-        """Keep the better of the incumbent and ``point``: certified before uncertified, then the lower objective."""
-        best = self.run.point
-        if best is None or (not point.certificate.certified, point.f) < (not best.certificate.certified, best.f):
-            self.run.point = point
-
-    def _point(self, w, zero, duals, final):
-        """The solution of branch ``zero``, certified; None if it has none.
-
-        A branch that was solved is not solved again; one that failed gets more tries, from better points, with and without
-        multipliers in turn.
-        """
-        key = zero.tobytes()
-        if self._tried[key] >= TRIES:
-            return None
-        self._tried[key] += 1
-        patient = final or self._tried[key] == TRIES
-        point = self._certified(w, zero, duals=duals if self._tried[key] != 2 else None, max_iter=None if patient else EARLY)
-        if point is None and final and duals is not None:
-            point = self._certified(w, zero, duals=None)
-        if point is not None and point.certificate.grade is not Stationarity.DESCENT:
-            self._tried[key] = TRIES
-        return point
-
-    def _certified(self, w, zero, duals=None, **more):
-        solved, equal = self._solve_branch(w, zero, duals, **more)
-        if solved is None:
-            return None
-        if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
-            raise Stop(Outcome.UNBOUNDED)
-        certificate = self._steps.certify(solved, equal)
-        if not certificate.feasible:
-            return None
-        return Point(solved, self._c.evaluate(solved.w).f, certificate, equal)
-
-    def _solve_branch(self, w, zero, duals, **more):
-        """Two stages where pairs are to be decided (eq. 13): with the penalty to read eta, then with what eta decides."""
-        c = self._c
-        first = self._steps.branch(w, zero, None, 1.0, duals=duals, **more)
-        if first is None or not c.eta.numel():
-            return first, None
-        equal = c.evaluate(first.w).eta > self._tolerances.eta
-        return self._steps.branch(first.w, zero, equal, 0.0, duals=first, **more), equal
+#: option ``mode`` -> what it runs
+MODES = {'hybrid': HybridSolver._hybrid, 'relaxation': HybridSolver._relaxation_only}

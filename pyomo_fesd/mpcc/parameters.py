@@ -10,96 +10,140 @@ import numpy as np
 from pyomo.common.collections import ComponentMap
 from pyomo.common.modeling import unique_component_name
 from pyomo.core import Block, Constraint, ConstraintList, Objective, VarList, value
+from pyomo.core.expr import RangedExpression
 from pyomo.core.expr.visitor import identify_mutable_parameters, replace_expressions
 
 from pyomo_fesd.errors import FesdError
 
 
 def parameter_data(components):
-    """The scalar parameters among ``components`` (indexed or not).
+    """The scalar parameters among ``components`` (indexed or not), each once.
 
     Raises
     ------
     FesdError
         for what is neither a fixed variable nor a mutable Param
     """
-    datas = [d for c in components for d in (c.values() if c.is_indexed() else (c,))]
-    for data in datas:
-        fixed = data.is_variable_type() and data.fixed if hasattr(data, 'is_variable_type') else False
-        if not fixed and not (hasattr(data, 'is_parameter_type') and data.is_parameter_type()):
-            raise FesdError(data, "not a parameter: neither a fixed variable nor a mutable Param", "fix it, or leave it out")
-    return datas
+    found = {}
+    for component in components:
+        indexed = getattr(component, 'is_indexed', bool)()
+        for data in component.values() if indexed else (component,):
+            if not may_change(data):
+                raise FesdError(
+                    component if indexed else data,
+                    "not a parameter: neither a fixed variable nor a mutable Param",
+                    "fix the variable, declare the Param with mutable=True, or leave it out of 'parameters'",
+                )
+            found[id(data)] = data
+    return list(found.values())
+
+
+def may_change(data):
+    """Whether ``data`` is a fixed variable or a mutable Param."""
+    if not hasattr(data, 'is_variable_type'):
+        return False
+    return data.fixed if data.is_variable_type() else data.is_parameter_type() and data.parent_component().mutable
+
+
+def parameter_values(parameters):
+    """Present values of ``parameters`` as an array.
+
+    Raises
+    ------
+    FesdError
+        for one without a value
+    """
+    for p in parameters:
+        if value(p, exception=False) is None:
+            raise FesdError(p, "this parameter has no value", "give it one before solving")
+    return np.array([value(p) for p in parameters], dtype=float)
 
 
 class Handles:
-    """What stands for the parameters while a model is compiled."""
+    """What stands for the parameters while a model is compiled.
 
-    def __init__(self, parameters):
-        self._parameters, self._stand_in, self._source = list(parameters), {}, ComponentMap()
-        self.variables = [p for p in self._parameters if p.is_variable_type()]
+    Parameters
+    ----------
+    parameters : list of VarData and ParamData
+    block : Block, optional
+        for the stand-ins of Params, and for the constraints and objective that contain them
 
-    def values(self):
-        """The parameters' present values, in the order of ``variables``."""
-        return parameter_values(self._parameters)
+    Attributes
+    ----------
+    parameters : list of VarData and ParamData
+    variables : list of VarData
+        one for each parameter, in their order
+    asleep : list
+        the model's constraints and objective that others replace
+    """
+
+    def __init__(self, parameters, block=None):
+        self.parameters = parameters
+        self._stand_in, self._source, self.asleep = {}, ComponentMap(), []
+        if block is not None:
+            block.stand_in, block.row = VarList(), ConstraintList()
+        for p, now in zip(parameters, parameter_values(parameters)):
+            if not p.is_variable_type():
+                self._stand_in[id(p)] = v = block.stand_in.add()
+                v.value = now
+        self.variables = [self._stand_in.get(id(p), p) for p in parameters]
 
     def in_terms(self, expr):
         """``expr`` with the stand-ins of its Params."""
-        if not self._stand_in or not hasattr(expr, 'is_expression_type'):
-            return expr
-        return replace_expressions(expr, self._stand_in)
+        return replace_expressions(expr, self._stand_in) if self._concerns(expr) else expr
 
     def source(self, constraint):
         """The model's constraint behind one in the NL file."""
         return self._source.get(constraint, constraint)
 
     def replace(self, model, block):
-        """Let variables of ``block`` stand in for the Params; returns the components to wake afterwards."""
-        block.stand_in, block.row = VarList(), ConstraintList()
-        for p in self._parameters:
-            if not p.is_variable_type():
-                v = block.stand_in.add()
-                v.value = value(p)
-                self._stand_in[id(p)] = v
-        # in the order of the parameters, as values() gives them
-        self.variables = [self._stand_in.get(id(p), p) for p in self._parameters]
-        asleep = []
-        if not self._stand_in:
-            return asleep
+        """Let rows of ``block`` in terms of the stand-ins replace the model's constraints and objective with Params."""
         for data in list(model.component_data_objects((Constraint, Objective), active=True, descend_into=Block)):
-            if data.parent_block() is block or not any(id(p) in self._stand_in for p in identify_mutable_parameters(data.expr)):
+            split = _variable_range(data.expr)
+            if not split and not self._concerns(data.expr):
                 continue
             if data.ctype is Objective:
                 block.objective = Objective(expr=self.in_terms(data.expr), sense=data.sense)
             else:
-                self._source[block.row.add(self.in_terms(data.expr))] = data
+                for row in self._halves(data.expr) if split else (self.in_terms(data.expr),):
+                    self._source[block.row.add(row)] = data
             data.deactivate()
-            asleep.append(data)
-        return asleep
+            self.asleep.append(data)
+
+    def _concerns(self, expr):
+        if not self._stand_in or not hasattr(expr, 'is_expression_type'):
+            return False
+        return any(id(p) in self._stand_in for p in identify_mutable_parameters(expr))
+
+    def _halves(self, expr):
+        """A range whose bounds are variables, which Pyomo does not take, as two rows."""
+        low, body, high = map(self.in_terms, expr.args)
+        return low <= body, body <= high
 
 
-def parameter_values(parameters):
-    """Present values of ``parameters`` as an array."""
-    return np.array([value(p) for p in parameters], dtype=float)
+def _variable_range(expr):
+    """Whether ``expr`` is a range with a bound that is a symbol while it is compiled."""
+    return isinstance(expr, RangedExpression) and any(hasattr(b, 'is_constant') and not b.is_constant() for b in expr.args[::2])
 
 
 @contextmanager
 def symbols(model, parameters):
     """Handles for ``parameters``; the model is as it was afterwards."""
-    handles = Handles(parameters)
-    fixed = list(handles.variables)
     if not parameters:
-        yield handles
+        yield Handles([])
         return
     block = Block()
     model.add_component(unique_component_name(model, '_pyomo_fesd_parameters'), block)
-    asleep = []
+    fixed = [p for p in parameters if p.is_variable_type()]
+    handles = Handles([])
     try:
+        handles = Handles(parameters, block)
         for v in fixed:
             v.unfix()
-        asleep = handles.replace(model, block)
+        handles.replace(model, block)
         yield handles
     finally:
-        for data in asleep:
+        for data in handles.asleep:
             data.activate()
         for v in fixed:
             v.fix()

@@ -126,7 +126,9 @@ class Penalty(Relaxation):
         self._rho = self.START
 
     def solve(self, w, eps, duals=None):
-        """Solve from ``w`` with the weight that brings every product to ``eps``."""
+        """Solve from ``w`` with the weight that brings every product to ``eps``; without multipliers a new path begins."""
+        if duals is None:
+            self._rho = self.START
         spent = 0
         while True:
             result = super().solve(w, 1 / self._rho, duals)

@@ -1,4 +1,4 @@
-"""What a run of the hybrid algorithm is made of: tolerances, steps, counts, points, and how it ended."""
+"""What a run of the hybrid algorithm is made of: tolerances, steps, starts, counts, points, and how it ended."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -11,12 +11,14 @@ class Outcome(Enum):
 
     CERTIFIED = "B-stationary point found and certified"
     SOLVED = "exactly complementary solution found; there is no objective to minimise"
+    RELAXED = "relaxation solved down to the last eps; nothing is certified"
     FEASIBLE = "feasible, exactly complementary point found, not certified"
     INFEASIBLE = "no feasible point found: the problem is locally infeasible"
     UNBOUNDED = "the objective falls without bound along feasible points"
     TIME_LIMIT = "time limit reached"
     ITERATION_LIMIT = "iteration limit reached"
     INTERRUPTED = "interrupted"
+    STOPPED = "stopped by the callback"
 
 
 class Stop(Exception):
@@ -51,6 +53,32 @@ class Step:
     status: str
     seconds: float
     w: np.ndarray = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Start:
+    """What became of one of several starts; ``pandas.DataFrame`` makes a table of a list of these.
+
+    Attributes
+    ----------
+    start : int
+        0 is the model's own values
+    outcome : str
+        a sentence; 'failed: ...' where the run was lost
+    certified : bool
+    objective : float or None
+        in the model's own sense; None without a feasible point
+    nlps, iterations : int
+    seconds : float
+    """
+
+    start: int
+    outcome: str
+    certified: bool = False
+    objective: float = None
+    nlps: int = 0
+    iterations: int = 0
+    seconds: float = 0.0
 
 
 @dataclass
@@ -92,6 +120,8 @@ class Run:
     eps : float
         the last relaxation parameter
     steps : list of Step
+    starts : list of Start
+        where there were several; counts are those of all, everything else is the best one's
     """
 
     outcome: Outcome = None
@@ -100,3 +130,4 @@ class Run:
     counts: Counts = field(default_factory=Counts)
     eps: float = None
     steps: list = field(default_factory=list)
+    starts: list = field(default_factory=list)

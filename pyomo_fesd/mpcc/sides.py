@@ -40,6 +40,13 @@ class Sides:
         """Mask over the sides (2q) that an assignment sets to zero."""
         return np.concatenate([zero == G_ZERO, zero == H_ZERO])
 
+    def same_rows(self, other):
+        """Whether the same sides have rows, and the others the same bounds."""
+        if not np.array_equal(self.row_of, other.row_of):
+            return False
+        without = np.flatnonzero(self.row_of < 0)
+        return (self.fixings[without] != other.fixings[without]).nnz == 0
+
 
 def sort_sides(c):
     """Sort the sides of a compiled MPCC."""

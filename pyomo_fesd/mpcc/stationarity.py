@@ -19,6 +19,7 @@ class Stationarity(Enum):
     FEASIBLE = "feasible, and there is no objective: nothing to descend"
     DESCENT = "not certified: the LPEC found a direction of descent"
     LIMITED = "not certified: descent is only stopped by a bound of the method (an element length); try another nfe or start"
+    RELAXED = "not certified: mode='relaxation' asks for no certificate"
     UNSOLVED = "not certified: HiGHS did not solve the LPEC"
     INFEASIBLE = "not certified: the point is not feasible"
 
@@ -82,18 +83,9 @@ def certify(c, lpec, w, tolerances, equal=None, multipliers=None):
     """
     at = c.evaluate(w)
     grad, J_g, J_G, J_H, _ = c.gradients(w)
-    rows, bounds = c.violations(w, at)
-    low = np.minimum(at.G, at.H)
-    negative = max(bounds.max(initial=0.0), -low.min(initial=0.0))
-    gap = np.abs(low)
-    rows_abs, bounds_abs, sides_abs = c.absolute(rows, bounds, np.concatenate([at.G, at.H]))
-    low_abs = sides_abs.reshape(2, -1).min(axis=0)
-    violation = max(rows_abs.max(initial=0.0), bounds_abs.max(initial=0.0), -low_abs.min(initial=0.0))
-    scaled = max(np.max(rows / _scale(J_g), initial=0.0), negative)
-    gap_scaled = float(np.max(gap / np.minimum(_scale(J_G), _scale(J_H)), initial=0.0))
     sets = active_sets(at.G, at.H, tolerances.biactive)
-    measures = (int(sets.gamma.sum()), float(violation), float(np.abs(low_abs).max(initial=0.0)), float(scaled), gap_scaled)
-    if max(scaled, gap_scaled) > tolerances.feasibility:
+    measures = _measures(c, at, w, sets, (J_g, J_G, J_H))
+    if max(measures[-2:]) > tolerances.feasibility:
         return Certificate(Stationarity.INFEASIBLE, 0.0, None, *measures)
     if not grad.any():
         # nothing descends where f is flat: no LPEC is needed
@@ -110,6 +102,28 @@ def certify(c, lpec, w, tolerances, equal=None, multipliers=None):
     elif result.value < -small:
         grade = Stationarity.DESCENT
     return Certificate(grade, result.value, result, *measures)
+
+
+def measure(c, w, tolerances):
+    """The residuals of a point that is not judged, as a ``Certificate`` without an LPEC."""
+    at, (_, J_g, J_G, J_H, _) = c.evaluate(w), c.gradients(w)
+    measures = _measures(c, at, w, active_sets(at.G, at.H, tolerances.biactive), (J_g, J_G, J_H))
+    feasible = max(measures[-2:]) <= tolerances.feasibility
+    return Certificate(Stationarity.RELAXED if feasible else Stationarity.INFEASIBLE, 0.0, None, *measures)
+
+
+def _measures(c, at, w, sets, jacobians):
+    """Bi-active pairs; violation and complementarity, absolute and scaled."""
+    J_g, J_G, J_H = jacobians
+    rows, bounds = c.violations(w, at)
+    low = np.minimum(at.G, at.H)
+    negative = max(bounds.max(initial=0.0), -low.min(initial=0.0))
+    rows_abs, bounds_abs, sides_abs = c.absolute(rows, bounds, np.concatenate([at.G, at.H]))
+    low_abs = sides_abs.reshape(2, -1).min(axis=0)
+    violation = max(rows_abs.max(initial=0.0), bounds_abs.max(initial=0.0), -low_abs.min(initial=0.0))
+    scaled = max(np.max(rows / _scale(J_g), initial=0.0), negative)
+    gap = float(np.max(np.abs(low) / np.minimum(_scale(J_G), _scale(J_H)), initial=0.0))
+    return int(sets.gamma.sum()), float(violation), float(np.abs(low_abs).max(initial=0.0)), float(scaled), gap
 
 
 def _scale(J):

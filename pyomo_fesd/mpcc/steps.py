@@ -10,10 +10,10 @@ from pyomo_fesd.mpcc.branch import Branch
 from pyomo_fesd.mpcc.feasibility import Feasibility
 from pyomo_fesd.mpcc.lpec import Lpec
 from pyomo_fesd.mpcc.nlp import nlp_solver
+from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.mpcc.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.run import Outcome, Step, Stop
-from pyomo_fesd.mpcc.sides import sort_sides
-from pyomo_fesd.mpcc.stationarity import certify
+from pyomo_fesd.mpcc.stationarity import certify, measure
 
 #: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
 BIACTIVE = 3.0
@@ -41,15 +41,14 @@ class Steps:
     show : callable Step -> None
         called after each NLP and LPEC
     deadline : Deadline
+    built : Built
+        prepared for these options
     """
 
-    def __init__(self, compiled, options, tolerances, run, timer, show, deadline):
+    def __init__(self, compiled, options, tolerances, run, timer, show, deadline, built):
         self._c, self._options, self._tolerances, self.run = compiled, options, tolerances, run
         self._timer, self._show, self._deadline = timer, show, deadline
-        timer.start('build')
-        self._sides = sort_sides(compiled)
-        timer.stop('build')
-        self._built, self._solver = {}, nlp_solver(options.nlp_solver)
+        self._sides, self._built, self._solver = built.sides, built.nlps, nlp_solver(options.nlp_solver)
         self._lpec = Lpec(compiled, self._sides, options.lpec_options.value(), deadline)
 
     # what the algorithm calls
@@ -85,13 +84,23 @@ class Steps:
         return self.lpec(w, sets, Delta, limits=SUGGESTION | {'time_limit': max(LEAST_TIME, spent)})
 
     def certify(self, nlp, equal):
-        """The certificate for the solution of a branch NLP."""
-        with self._timed('lpec') as started:
+        """The certificate for the solution of a branch NLP.  No limit keeps it from being judged; HiGHS stops at the deadline."""
+        started = time.perf_counter()
+        with phase(self._timer, 'lpec'):
             certificate = certify(self._c, self._lpec, nlp.w, self._tolerances, equal, -nlp.lam_g)
         if certificate.lpec is not None:
             self._count(certificate.lpec)
         self._log('certificate', 0.0, nlp.w, 0, certificate.grade.name, started)
         return certificate
+
+    def measure(self, relaxed):
+        """The residuals of a relaxation's solution."""
+        return measure(self._c, relaxed.w, self._tolerances)
+
+    def keep_least_infeasible(self, w):
+        """Remember the point to report if nothing feasible is found."""
+        if self.run.w is None or self.violation(w) < self.violation(self.run.w):
+            self.run.w = w
 
     def note(self, what, w):
         """A line in the log that costs nothing."""
@@ -137,11 +146,8 @@ class Steps:
     def _timed(self, kind):
         """Check the limits, then time what follows; gives the time at which it began."""
         self._check_limits()
-        self._timer.start(kind)
-        try:
+        with phase(self._timer, kind):
             yield time.perf_counter()
-        finally:
-            self._timer.stop(kind)
 
     def _check_limits(self):
         if self._deadline.expired():

@@ -1,4 +1,6 @@
-"""The log that ``tee=True`` prints: one aligned line for each NLP and LPEC."""
+"""The log that ``tee=True`` prints: one aligned line for each NLP and LPEC, or with several starts one for each start."""
+
+from contextlib import contextmanager
 
 #: Columns and their widths, negative for left-aligned.
 COLUMNS = {
@@ -13,27 +15,42 @@ COLUMNS = {
     'time': 7,
     ' status': -7,
 }
-HEADER = ' '.join(f'{name:{"<" if width < 0 else ">"}{abs(width)}}' for name, width in COLUMNS.items())
+START_COLUMNS = {'start': 5, 'objective': 15, 'nlps': 5, 'iter': 6, 'time': 8, ' outcome': -8}
+#: Objectives that differ by less, relative, count as one.
+DISTINCT = 1e-6
+
+
+def _header(columns):
+    return ' '.join(f'{name:{"<" if width < 0 else ">"}{abs(width)}}' for name, width in columns.items())
+
+
+@contextmanager
+def log_streams(tee, path):
+    """The streams ``tee`` and, if a path is given, a file that is open as long as the context."""
+    if path is None:
+        yield tee
+        return
+    with open(path, 'w') as file:
+        yield [*tee, file]
 
 
 class Table:
-    """Prints a run to ``streams``.
+    """Prints a run to ``streams``, a list of text streams."""
 
-    Parameters
-    ----------
-    streams : list of text streams
-    compiled : Compiled
-    """
+    COLUMNS = COLUMNS
 
-    def __init__(self, streams, compiled):
+    def __init__(self, streams):
         self._streams, self._number = streams, 0
+
+    def begin(self, compiled):
+        """Print the sizes and the head."""
         c = compiled
         self._print(
             f"mpec_hybrid: {len(c.variables)} variables, {len(c.constraints)} constraints, {len(c.conditions)} pairs"
             + (f", {len(c.decisions)} decided by the branch" if c.decisions else "")
             + (f"; {c.missing} values were missing and start at 0 or their bound" if c.missing else "")
         )
-        self._print(HEADER)
+        self._print(_header(self.COLUMNS))
 
     def row(self, step):
         """Print one step."""
@@ -59,3 +76,26 @@ class Table:
         for stream in self._streams:
             stream.write(line + '\n')
             stream.flush()
+
+
+class StartsTable(Table):
+    """As ``Table``, for several starts."""
+
+    COLUMNS = START_COLUMNS
+
+    def row(self, start):
+        """Print one start."""
+        objective = ' ' * 15 if start.objective is None else f'{start.objective:15.8e}'
+        work = f'{start.nlps:5d} {start.iterations:6d} {start.seconds:7.2f}s'
+        self._print(f'{start.start:5d} {objective} {work}  {start.outcome.splitlines()[0]}')
+
+    def end(self, results):
+        """Print how far the starts are apart, and the result."""
+        starts = results.extra_info.starts
+        f = sorted(start.objective for start in starts if start.certified)
+        if f:
+            distinct = 1 + sum(b - a > DISTINCT * max(1.0, abs(a)) for a, b in zip(f, f[1:]))
+            self._print(
+                f"{len(starts)} starts, {len(f)} certified with {distinct} distinct objective(s) from {f[0]:.10g} to {f[-1]:.10g}"
+            )
+        super().end(results)

@@ -88,7 +88,10 @@ def as_model(data):
     n, q = len(data['cost']), len(data['r'])
     m = pyo.ConcreteModel()
     m.w = pyo.Var(range(n), bounds=(0, 1), initialize=0.5)
-    dot = lambda row: sum(float(a) * m.w[j] for j, a in enumerate(row))
+
+    def dot(row):
+        return sum(float(a) * m.w[j] for j, a in enumerate(row))
+
     m.f = pyo.Objective(expr=dot(data['cost']))
     m.rows = pyo.Constraint(range(2), rule=lambda m, i: dot(data['A'][i]) <= float(data['b'][i]))
     m.c = Complementarity(

@@ -3,21 +3,15 @@
 dx/dt = 2 c below zero and 3 c^2 above, x(0) = -1, 0 <= t <= 2: x = t^2 - 1 up to t = 1, then t^3 - 1, x(2) = 7.
 """
 
-import pyomo.dae as dae
 import pyomo.environ as pyo
+from problems.states import over_time
 from pyomo.gdp import Disjunction
 
 SWITCH, FINAL = 1.0, 7.0
 
 
 def build():
-    m = pyo.ConcreteModel()
-    m.t = dae.ContinuousSet(bounds=(0, 2))
-    m.c = pyo.Var(m.t, initialize=0)
-    m.x = pyo.Var(m.t, initialize=-1)
-    m.dc, m.dx = dae.DerivativeVar(m.c), dae.DerivativeVar(m.x)
-    m.c[0].fix(0)
-    m.x[0].fix(-1)
+    m = over_time(2, c=0, x=-1)
     m.clock = pyo.Constraint(m.t, rule=lambda m, t: m.dc[t] == 1)
     m.zero = Disjunction(
         m.t, rule=lambda m, t: [[m.x[t] <= 0, m.dx[t] == 2 * m.c[t]], [m.x[t] >= 0, m.dx[t] == 3 * m.c[t] ** 2]]

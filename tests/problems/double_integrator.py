@@ -5,6 +5,7 @@ q reaches 1/2 at t = 1 with v = -1 and ends at q(2) = -0.625, v(2) = -1.25.  The
 
 import pyomo.dae as dae
 import pyomo.environ as pyo
+from problems.states import over_time
 from pyomo.gdp import Disjunction
 
 SWITCH, FINAL_Q, FINAL_V = 1.0, -0.625, -1.25
@@ -12,14 +13,8 @@ ACCELERATIONS = (-1.0, -0.25)  # before and after
 
 
 def build():
-    m = pyo.ConcreteModel()
-    m.t = dae.ContinuousSet(bounds=(0, 2))
-    m.q = pyo.Var(m.t, initialize=1)
-    m.v = pyo.Var(m.t, initialize=0)
-    m.dq, m.dv = dae.DerivativeVar(m.q), dae.DerivativeVar(m.v)
+    m = over_time(2, q=1, v=0)
     m.ddq = dae.DerivativeVar(m.q, wrt=(m.t, m.t))
-    m.q[0].fix(1)
-    m.v[0].fix(0)
     m.speed = pyo.Constraint(m.t, rule=lambda m, t: m.dq[t] == m.v[t])
     m.ground = Disjunction(m.t, rule=lambda m, t: [[m.q[t] >= 0.5, m.dv[t] == -1], [m.q[t] <= 0.5, m.dv[t] == -0.25]])
     return m

@@ -30,6 +30,12 @@ def _not_negative(*variables):
             data.setlb(0)
 
 
+def _at_most(bound, *variables):
+    for v in variables:
+        for data in v.values():
+            data.setub(bound)
+
+
 def _pairs(m, *sides):
     """m.c: 0 <= G perp H >= 0 for each (G, H)."""
     m.c = Complementarity(range(len(sides)), rule=lambda m, i: complements(sides[i][0] >= 0, sides[i][1] >= 0))
@@ -133,8 +139,7 @@ def desilva():
     m = _variables(x=[0, 0], y=[0, 0], u=[0, 0])
     _not_negative(m.x, m.u)
     x, y, u = m.x, m.y, m.u
-    for i in x:
-        x[i].setub(2)
+    _at_most(2, x)
     m.f = pyo.Objective(expr=sum(x[i] ** 2 - 2 * x[i] + y[i] ** 2 for i in x))
     m.kkt = pyo.Constraint([1, 2], rule=lambda m, i: 2 * y[i] - 2 * x[i] + 2 * (y[i] - 1) * u[i] == 0)
     _pairs(m, *((0.25 - (y[i] - 1) ** 2, u[i]) for i in x))
@@ -218,8 +223,7 @@ def flp2():
     m = _variables(x=[0, 0], y=[0, 0])
     _not_negative(m.x, m.y)
     x, y = m.x, m.y
-    for i in x:
-        x[i].setub(10)
+    _at_most(10, x)
     m.f = pyo.Objective(expr=sum((x[1] + x[2] + y[i] - 15) ** 2 for i in y) / 2)
     _pairs(
         m,
@@ -234,8 +238,7 @@ def nash1():
     m = _variables(x=[0, 0], y=[0, 0], u=[0, 0])
     _not_negative(m.x, m.u)
     x, y, u = m.x, m.y, m.u
-    for i in x:
-        x[i].setub(10)
+    _at_most(10, x)
     m.f = pyo.Objective(expr=sum((x[i] - y[i]) ** 2 for i in x) / 2)
     m.kkt1 = pyo.Constraint(expr=-34 + 2 * y[1] + 8 / 3 * y[2] + u[1] == 0)
     m.kkt2 = pyo.Constraint(expr=-24.25 + 1.25 * y[1] + 2 * y[2] + u[2] == 0)

@@ -1,7 +1,7 @@
 """Entering a slide: dx/dt = -sgn x, x(0) = -0.5, 0 <= t <= 1.5; from t = 0.5 on x = 0 with both modes at one half."""
 
-import pyomo.dae as dae
 import pyomo.environ as pyo
+from problems.states import over_time
 from pyomo.gdp import Disjunction
 
 SWITCH, NU = 0.5, 0.5
@@ -9,11 +9,7 @@ CURVED = {'switch': (3**0.5 - 1) / 2, 'x': -(0.45**2), 'nu': 0.05}  # the curved
 
 
 def build():
-    m = pyo.ConcreteModel()
-    m.t = dae.ContinuousSet(bounds=(0, 1.5))
-    m.x = pyo.Var(m.t, initialize=-0.5)
-    m.dx = dae.DerivativeVar(m.x)
-    m.x[0].fix(-0.5)
+    m = over_time(1.5, x=-0.5)
 
     @m.Disjunct(m.t)
     def rising(d, t):
@@ -36,13 +32,7 @@ def build_curved():
 
     There x = -t^2, so that nu = 1/2 - t.
     """
-    m = pyo.ConcreteModel()
-    m.t = dae.ContinuousSet(bounds=(0, 0.45))
-    m.x = pyo.Var(m.t, initialize=-0.5)
-    m.y = pyo.Var(m.t, initialize=0)
-    m.dx, m.dy = dae.DerivativeVar(m.x), dae.DerivativeVar(m.y)
-    m.x[0].fix(-0.5)
-    m.y[0].fix(0)
+    m = over_time(0.45, x=-0.5, y=0)
     m.clock = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == 1)
     m.bowl = Disjunction(
         m.t,

@@ -1,0 +1,178 @@
+"""Branches: solved, certified, and left for better ones as long as the LPEC shows a way (theory, section 4).
+
+The best point so far is ``Run.point``: an exactly complementary solution of its branch NLP with the certificate of the LPEC.
+"""
+
+from collections import Counter
+
+import numpy as np
+
+from pyomo_fesd.mpcc.active_set import active_sets
+from pyomo_fesd.mpcc.run import Outcome, Point, Stop
+from pyomo_fesd.mpcc.search import leaves
+from pyomo_fesd.mpcc.stationarity import Stationarity
+
+#: A branch NLP's objective must fall by this, relative, to count as descent.
+PROGRESS = 1e-8
+#: Attempts at a branch NLP before it counts as infeasible, and the iterations that the early ones may use.
+TRIES, EARLY = 2, 60
+#: The trust region of a descent step shrinks by this, so often.
+SHRINK, SHRINKS = 0.1, 3
+#: More bi-active pairs than this say little of the branch, and an LPEC over them takes long.
+SUGGESTED = 50
+#: Trust region of the LPEC that looks for any feasible branch.
+FAR = 1e3
+#: A feasible point with variables beyond this has run away along an unbounded objective.
+UNBOUNDED = 1e15
+
+
+class Branches:
+    """The branches of one run.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    steps : Steps
+    tolerances : Tolerances
+    gap : GapTest
+        of the homotopy: a point far above what it promises is not worth a descent
+    far_sighted : bool
+        whether a full LPEC looks beyond the bi-active pairs for a better branch (option ``lpec='full'``)
+    """
+
+    def __init__(self, compiled, steps, tolerances, gap, far_sighted):
+        self._c, self._steps, self._tolerances, self._gap = compiled, steps, tolerances, gap
+        self._far_sighted, self.run, self._tried = far_sighted, steps.run, Counter()
+
+    # what the algorithm calls
+
+    def explore(self, relaxed, sets, final):
+        """Solve the branch that active sets name, or if it has no solution, the one that an LPEC suggests; descend from it.
+
+        Parameters
+        ----------
+        relaxed : NlpResult
+            a relaxation's result, or the values to start at
+        sets : ActiveSets
+            at this point
+        final : bool
+            whether the homotopy ends here: no budget, and every descent is followed
+        """
+        point = self._point(relaxed.w, sets.zero, relaxed, final)
+        if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
+            zero = self._steps.suggestion(relaxed.w, sets, self._tolerances.radius).zero
+            point = self._point(relaxed.w, zero, relaxed, final)
+        self._improve_from(point, final)
+
+    def explore_from(self, w, final):
+        """Solve the branch that the values ``w`` name."""
+        self._improve_from(self._point(w, active_sets(*self._sides(w), self._tolerances.biactive).zero, None, final), final)
+
+    def search(self, *starts):
+        """Look for any feasible branch: by the LPEC with every pair as a binary, and depth first over the pairs."""
+        self.forget()
+        for w in starts:
+            step = self._steps.suggestion(w, active_sets(*self._sides(w), np.inf), FAR)
+            if step.solved and self._found(w + step.d, step.zero):
+                return
+        self._steps.note("search over the pairs", starts[-1])
+        for w, zero in leaves(self._c, self._steps.branch, starts[-1], self._tolerances.feasibility):
+            if self._found(w, zero):
+                return
+
+    def tried(self, zero):
+        """Whether a branch has had its attempts."""
+        return self._tried[zero.tobytes()] >= TRIES
+
+    def forget(self):
+        """Another path may make a branch succeed that failed before."""
+        self._tried.clear()
+
+    # how a point is found
+
+    def _found(self, w, zero):
+        self._improve_from(self._point(w, zero, None, True), True)
+        return self.run.point is not None
+
+    def _improve_from(self, point, final):
+        """Keep ``point`` and what descends from it, while the homotopy does not promise something much better."""
+        while point is not None:
+            self._keep(point)
+            point = self._descend(point) if final or self._gap.closed(point.f) else None
+
+    def _keep(self, point):
+        """Keep the better of the incumbent and ``point``: certified before uncertified, then the lower objective."""
+        best = self.run.point
+        if best is None or (not point.certificate.certified, point.f) < (not best.certificate.certified, best.f):
+            self.run.point = point
+
+    def _descend(self, point):
+        """A better point, or None."""
+        enough = point.f - PROGRESS * max(1.0, abs(point.f))
+        if point.certificate.grade is Stationarity.DESCENT:
+            return self._step_down(point, enough)
+        return self._look_far(point, enough) if self._far_sighted and point.certificate.grade is Stationarity.B else None
+
+    def _step_down(self, point, enough):
+        """In the branch of the certificate's direction: from its end, or within ever smaller trust regions."""
+        step, w = point.certificate.lpec, point.w
+        better = self._point(w + step.d, step.zero, None, False)
+        radius = self._tolerances.radius
+        sets = active_sets(*self._sides(w), self._tolerances.biactive)
+        for _ in range(SHRINKS):
+            if better is not None and better.f <= enough:
+                return better
+            radius *= SHRINK
+            step = self._steps.lpec(w, sets, radius, point.equal)
+            if not step.solved or step.value == 0.0:
+                return None
+            reach = radius * np.maximum(1.0, np.abs(w))
+            better = self._certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=EARLY)
+        return better if better is not None and better.f <= enough else None
+
+    def _look_far(self, point, enough):
+        """In a branch that need not touch this point: where the LPEC with every pair as a binary leads."""
+        step = self._steps.lpec(point.w, active_sets(*self._sides(point.w), np.inf), self._tolerances.radius, point.equal)
+        better = self._point(point.w + step.d, step.zero, None, False) if step.solved and step.value < 0.0 else None
+        return better if better is not None and better.f <= enough else None
+
+    def _sides(self, w):
+        at = self._c.evaluate(w)
+        return at.G, at.H
+
+    def _point(self, w, zero, duals, final):
+        """The solution of branch ``zero``, certified; None if it has none.
+
+        A branch that was solved is not solved again; one that failed gets another try, from a better point and without multipliers.
+        """
+        if self.tried(zero):
+            return None
+        key = zero.tobytes()
+        self._tried[key] += 1
+        again = self._tried[key] == TRIES
+        point = self._certified(w, zero, duals=None if again else duals, max_iter=None if final or again else EARLY)
+        if point is None and final and duals is not None and not again:
+            point = self._certified(w, zero, duals=None)
+        if point is not None and point.certificate.grade is not Stationarity.DESCENT:
+            self._tried[key] = TRIES
+        return point
+
+    def _certified(self, w, zero, duals=None, **more):
+        solved, equal = self._solve(w, zero, duals, **more)
+        if solved is None:
+            return None
+        if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
+            raise Stop(Outcome.UNBOUNDED)
+        certificate = self._steps.certify(solved, equal)
+        if not certificate.feasible:
+            return None
+        return Point(solved, self._c.evaluate(solved.w).f, certificate, equal)
+
+    def _solve(self, w, zero, duals, **more):
+        """Two stages where pairs are to be decided (eq. 13): with the penalty to read eta, then with what eta decides."""
+        c = self._c
+        first = self._steps.branch(w, zero, None, 1.0, duals=duals, **more)
+        if first is None or not c.eta.numel():
+            return first, None
+        equal = c.evaluate(first.w).eta > self._tolerances.eta
+        return self._steps.branch(first.w, zero, equal, 0.0, duals=first, **more), equal

@@ -1,0 +1,119 @@
+"""The options of ``mpec_hybrid``, one row each: name, default, domain, meaning."""
+
+from pyomo.common.config import (
+    ConfigDict,
+    ConfigValue,
+    In,
+    NonNegativeInt,
+    Path,
+    PositiveFloat,
+    PositiveInt,
+    document_configdict,
+)
+from pyomo.contrib.solver.common.config import SolverConfig
+
+from pyomo_fesd.mpcc.relaxation import RELAXATIONS
+
+
+def function(given):
+    """Domain of options that are called."""
+    if not callable(given):
+        raise ValueError(f"not callable: {given!r}")
+    return given
+
+
+def executor(given):
+    """Domain of the option ``executor``: what has the methods of ``concurrent.futures.Executor``."""
+    if not callable(getattr(given, 'submit', None)):
+        raise ValueError("not an executor: it has no method 'submit' as those of concurrent.futures have")
+    return given
+
+
+OPTIONS = (
+    ('eps_init', 1.0, PositiveFloat, "first relaxation parameter eps of Reg(eps) (eq. 15)"),
+    ('eps_final', 1e-9, PositiveFloat, "smallest eps; the homotopy usually ends earlier, at a certified branch"),
+    ('eps_factor', 0.1, PositiveFloat, "eps is multiplied by this after each relaxation (1/Q)"),
+    (
+        'relaxation',
+        'auto',
+        In(['auto', *RELAXATIONS]),
+        "form of Reg(eps): 'elastic' (one slack, weight 1/eps), 'scholtes' (products <= eps), others of the same kind, or "
+        "'auto': elastic without an objective, scholtes with one, the other after a failure",
+    ),
+    (
+        'mode',
+        'hybrid',
+        In(['hybrid', 'relaxation']),
+        "'hybrid': branches and certificates; 'relaxation': only the homotopy down to eps_final, for comparison, with no certificate",
+    ),
+    (
+        'lpec',
+        'reduced',
+        In(['reduced', 'full']),
+        "'reduced': binaries for bi-active pairs only; 'full': also an LPEC with a binary for every pair that looks for a better "
+        "branch within the trust region after each certificate",
+    ),
+    (
+        'warm_start',
+        False,
+        bool,
+        "begin at the branch that the values in the model name; if its solution is certified, the run ends there, at the local "
+        "solution next to the start, without a homotopy; of several starts only the first does so",
+    ),
+    (
+        'nlp_solver',
+        'ipopt',
+        str,
+        "NLP solver: 'ipopt' (the one in casadi's wheel), 'uno' (also there), 'cyipopt' (the system's Ipopt), or an "
+        "executable that reads NL files and that Pyomo knows, e.g. 'pounce', 'asl:ipopt'",
+    ),
+    ('relaxation_tol', 1e-4, PositiveFloat, "Ipopt's tol for relaxations, which only lead to a branch"),
+    ('relaxation_iterations', 500, PositiveInt, "Ipopt iterations allowed to one relaxation"),
+    ('gap_tol', 5e-5, PositiveFloat, "gap test: relative distance of incumbent and relaxed objective that ends a run"),
+    ('feasibility_tol', 1e-6, PositiveFloat, "largest scaled violation and complementarity of a reported point"),
+    ('biactive_tol', 1e-6, PositiveFloat, "sides below this are both zero at a branch solution (eq. 16)"),
+    ('descent_tol', 1e-6, PositiveFloat, "LPEC value, relative to max(1, |f|), that counts as no descent"),
+    ('eta_tol', 1e-3, PositiveFloat, "indicator of step equilibration above which nothing has switched (eq. 13)"),
+    ('trust_radius', 1.0, PositiveFloat, "trust region Delta of the LPEC, relative for large variables (eq. 17)"),
+    ('branch_tol', 1e-9, PositiveFloat, "Ipopt's tol for branch NLPs"),
+    ('branch_iterations', 300, PositiveInt, "Ipopt iterations allowed to one branch NLP; a wrong branch burns them all"),
+    ('max_iterations', 20000, PositiveInt, "Ipopt iterations allowed in all; with several starts, to each"),
+    ('starts', 1, PositiveInt, "solve from so many points, the first being the model's values, and keep the best"),
+    ('seed', 0, NonNegativeInt, "of the random points: the same seed gives the same points"),
+    (
+        'executor',
+        None,
+        executor,
+        "where the starts run: None for one by one in this process, or an executor of concurrent.futures or with its "
+        "methods, e.g. ProcessPoolExecutor() or Dask's client.get_executor()",
+    ),
+    ('user_scaling', True, bool, "honour Pyomo's scaling_factor suffixes"),
+    (
+        'callback',
+        None,
+        function,
+        "called after every relaxation, and what it led to, with a Progress; if it returns something true, the run ends with the "
+        "best point so far; not together with an executor",
+    ),
+    ('log_file', None, Path(), "file for the log that tee=True prints, whether or not tee is on"),
+    ('json_file', None, Path(), "file for a record of the run, also of one that fails: attach it to a bug report"),
+)
+#: Options that are passed through, and to whom.
+PASSED_ON = (
+    ('nlp_options', "options passed to Ipopt, e.g. {'max_iter': 3000}"),
+    ('lpec_options', "options passed to HiGHS, e.g. {'threads': 2}"),
+)
+
+
+@document_configdict()
+class MpecHybridConfig(SolverConfig):
+    """Options of ``mpec_hybrid``."""
+
+    def __init__(self, description=None, doc=None, implicit=False, implicit_domain=None, visibility=0):
+        super().__init__(
+            description=description, doc=doc, implicit=implicit, implicit_domain=implicit_domain, visibility=visibility
+        )
+        for name, default, domain, text in OPTIONS:
+            setattr(self, name, self.declare(name, ConfigValue(default=default, domain=domain, description=text)))
+        for name, text in PASSED_ON:
+            setattr(self, name, self.declare(name, ConfigDict(implicit=True, description=text)))

@@ -1,0 +1,141 @@
+"""What the NL writer has to write besides the model's own rows, on a block that is gone afterwards.
+
+Takes: the ``Mpcc`` and the ``Handles`` of its parameters.
+Leaves: ``Entries``, as long as the context is open; then the model as it was.
+"""
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from pyomo.common.collections import ComponentMap
+from pyomo.common.modeling import unique_component_name
+from pyomo.core import Block, ConstraintList, Objective, Suffix, VarList, quicksum, value
+from pyomo.repn import generate_standard_repn
+
+from pyomo_fesd.mpcc.problem import Condition
+from pyomo_fesd.mpcc.source import set_parts
+
+#: A bound that no sum reaches.
+ALWAYS = 1e300
+
+
+@dataclass(frozen=True)
+class Entries:
+    """What stands in the NL file for each expression of the MPCC: a row ``expr >= 0``, a plain variable, or a number.
+
+    Attributes
+    ----------
+    conditions : list of Condition, with those that mixed conditions were split into
+    G, H : lists, one entry each condition
+    eta, equal : lists, one entry each decision
+    penalty : list, one entry each term
+    present : list, rows that say nothing
+    splits : list of (VarData, VarData, expression), auxiliary variables as in ``Source``
+    """
+
+    conditions: list
+    G: list
+    H: list
+    eta: list
+    equal: list
+    penalty: list
+    present: list
+    splits: list
+
+
+@contextmanager
+def entries_of(problem, handles):
+    """The ``Entries`` of ``problem`` on a scratch block; its pairs and the exported suffixes sleep while it exists."""
+    model, scratch = problem.model, Block()
+    model.add_component(unique_component_name(model, '_pyomo_fesd_scratch'), scratch)
+    pairs, suffixes = _sleep(problem.sources), _sleep_suffixes(model)
+    try:
+        yield _entries(scratch, problem, handles)
+    finally:
+        model.del_component(scratch)
+        for suffix in suffixes:
+            suffix.activate()
+        _wake(pairs)
+
+
+def _entries(scratch, problem, handles):
+    scratch.row = ConstraintList()
+    scratch.part = VarList()
+    if problem.objective is None:
+        scratch.objective = Objective(expr=0)
+    splits, known = [], {}
+    conditions = problem.conditions + [c for source, m in problem.mixed for c in _split(scratch, source, m, handles, splits)]
+    G = [_shared_entry(scratch, c.G, handles, known) for c in conditions]
+    H = [_shared_entry(scratch, c.H, handles, known) for c in conditions]
+    return Entries(
+        conditions,
+        G,
+        H,
+        eta=[_entry(scratch, handles.in_terms(d.eta)) for d in problem.decisions],
+        equal=[_entry(scratch, handles.in_terms(d.constraint.body - d.constraint.upper)) for d in problem.decisions],
+        penalty=[_entry(scratch, handles.in_terms(weight * term.expr)) for term, weight in problem.penalties],
+        # parameters and plain sides must be in the NL file even if they stand nowhere else
+        present=[_keep(scratch, handles.variables), _keep(scratch, G + H)],
+        splits=splits,
+    )
+
+
+def _split(scratch, source, m, handles, splits):
+    """l <= B <= u perp F as B - l perp F+ and u - B perp F- with F = F+ - F-."""
+    plus, minus = scratch.part.add(), scratch.part.add()
+    plus.setlb(0)
+    minus.setlb(0)
+    set_parts(plus, minus, m.F)
+    splits.append((plus, minus, m.F))
+    scratch.row.add(handles.in_terms(m.F) == plus - minus)
+    return [Condition(source, m.body - m.lower, plus), Condition(source, m.upper - m.body, minus)]
+
+
+def _shared_entry(scratch, expr, handles, known):
+    """As ``_entry``, one for a side that stands in several pairs: its branch equation must not appear twice."""
+    if id(expr) not in known:
+        known[id(expr)] = _entry(scratch, handles.in_terms(expr))
+    return known[id(expr)]
+
+
+def _entry(scratch, expr):
+    """What stands for ``expr`` in the NL file."""
+    if not hasattr(expr, 'is_fixed'):
+        return value(expr)
+    if expr.is_fixed():
+        # 0 * x is fixed although x may have no value
+        return generate_standard_repn(expr, compute_values=True).constant
+    if expr.is_variable_type():
+        return expr
+    return scratch.row.add(expr >= 0)
+
+
+def _keep(scratch, entries):
+    """A row that keeps variables in the NL file which stand in no other: the writer drops those."""
+    variables = [e for e in entries if hasattr(e, 'is_variable_type') and e.is_variable_type()]
+    return scratch.row.add(quicksum(variables) <= ALWAYS) if variables else 0.0
+
+
+def _sleep(sources):
+    """Deactivate the components of all ``sources``, which the NL writer refuses; returns what ``_wake`` needs."""
+    components = ComponentMap()
+    for source in sources:
+        components.setdefault(source.parent_component(), []).append(source)
+    for component in components:
+        component.deactivate()
+    return components
+
+
+def _wake(components):
+    for component, datas in components.items():
+        component._active = True
+        for data in datas:
+            data.activate()
+
+
+def _sleep_suffixes(model):
+    """Deactivate the suffixes that the NL writer would export; returns them."""
+    suffixes = [s for s in model.component_objects(Suffix, active=True, descend_into=Block) if s.export_enabled()]
+    for suffix in suffixes:
+        suffix.deactivate()
+    return suffixes
