@@ -44,7 +44,7 @@ OPTIONS = (
         'mode',
         'hybrid',
         In(['hybrid', 'relaxation']),
-        "'hybrid': branches and certificates; 'relaxation': only the homotopy down to eps_final, for comparison, with no certificate",
+        "'hybrid': branches and certificates; 'relaxation': only the homotopy, down to eps_final, without any certificate",
     ),
     (
         'lpec',

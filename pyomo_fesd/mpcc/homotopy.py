@@ -15,7 +15,7 @@ from pyomo_fesd.mpcc.recovery import LADDER
 #: Without an objective any solution will do, and the elastic form is by far the quickest to one; with an objective it settles
 #: early in worse minima than Scholtes' (gas-liquid optimal control: 250.005 instead of 250).  A failure changes the form.
 AUTO = {False: ('elastic', 'scholtes'), True: ('scholtes', 'elastic')}
-#: From this eps on multipliers are carried along; before, Ipopt's own centring finds better minima (time-optimal car: 13.3, not 16).
+#: From this eps on multipliers are carried along; before, Ipopt's own centring finds better minima (a car: 13.3, not 16).
 CARRIED = 1e-2
 #: From this eps on a relaxation is worth a branch NLP, which is much cheaper than the next relaxation, unless more than this part
 #: of the pairs could still go either way.

@@ -72,7 +72,9 @@ def _fill_certificate(info, certificate):
 def _status_of(run):
     if run.w is None:
         return SolutionStatus.noSolution
-    return SolutionStatus.unknown if run.point is None else SolutionStatus.feasible
+    if run.point is None:
+        return SolutionStatus.unknown
+    return SolutionStatus.feasible if run.point.certificate.feasible else SolutionStatus.infeasible
 
 
 def _violated(c, w):

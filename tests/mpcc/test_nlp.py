@@ -11,6 +11,7 @@ import pytest
 from pyomo_fesd import FesdError
 from pyomo_fesd.mpcc import nlp
 from pyomo_fesd.mpcc.deadline import Deadline
+from pyomo_fesd.mpcc.derivatives import automatic
 
 SOLVERS = ['ipopt', 'uno', 'cyipopt', 'pounce']
 #: The limit of iterations in each solver's own words.
@@ -27,13 +28,13 @@ def solver(request):
     return request.param
 
 
-def distance(solver, extra=(), budget=None, jacobian=False, **settings):
+def distance(solver, extra=(), budget=None, own=False, **settings):
     """min (x - 1)^2 + (y - p)^2  s.t.  x + y <= 2 and x y >= 0.1, x and y in [0, 10]; more rows behind them."""
     x, p = ca.SX.sym('x', 2), ca.SX.sym('p')
     f = (x[0] - 1) ** 2 + (x[1] - p) ** 2
     g = ca.vertcat(x[0] + x[1], x[0] * x[1], *(row(x, p) for row in extra))
-    own = ca.jacobian(g, x) if jacobian else None
-    return nlp.nlp_solver(solver)('distance', x, p, f, g, {'tol': 1e-9} | (budget or {}), jacobian=own, **settings)
+    derivatives = automatic(x, f, g) if own else None
+    return nlp.nlp_solver(solver)('distance', x, p, f, g, {'tol': 1e-9} | (budget or {}), derivatives=derivatives, **settings)
 
 
 def valley(solver, **settings):
@@ -53,9 +54,9 @@ def same(found, wanted):
     np.testing.assert_allclose(found, wanted, atol=1e-5)
 
 
-@pytest.mark.parametrize('jacobian', [False, True])
-def test_point_objective_and_multipliers(solver, jacobian):
-    result = solve(distance(solver, jacobian=jacobian))
+@pytest.mark.parametrize('own', [False, True])
+def test_point_objective_and_multipliers(solver, own):
+    result = solve(distance(solver, own=own))
     assert result.solved
     assert result.iterations >= 1
     same(result.w, [0.5, 1.5])
