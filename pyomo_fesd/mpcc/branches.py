@@ -22,7 +22,8 @@ SHRINK, SHRINKS = 0.1, 3
 SUGGESTED = 50
 #: Trust region of the LPEC that looks for any feasible branch.
 FAR = 1e3
-#: A feasible point with variables beyond this has run away along an unbounded objective.
+#: A feasible point with variables beyond this and a negative objective has run away along an unbounded one; with a positive one
+#: it only started where a relaxation had run away to.
 UNBOUNDED = 1e15
 
 
@@ -95,10 +96,13 @@ class Branches:
         return self.run.point is not None
 
     def _improve_from(self, point, final):
-        """Keep ``point`` and what descends from it, while the homotopy does not promise something much better."""
+        """Keep ``point`` and what descends from it, while the homotopy does not promise something much better.
+
+        The far-sighted do not wait for the homotopy: a point that it settles later is not solved again, nor looked from.
+        """
         while point is not None:
             self._keep(point)
-            point = self._descend(point) if final or self._gap.closed(point.f) else None
+            point = self._descend(point) if final or self._far_sighted or self._gap.closed(point.f) else None
 
     def _keep(self, point):
         """Keep the better of the incumbent and ``point``: certified before uncertified, then the lower objective."""
@@ -161,12 +165,15 @@ class Branches:
         solved, equal = self._solve(w, zero, duals, **more)
         if solved is None:
             return None
+        f = self._c.evaluate(solved.w).f
         if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
-            raise Stop(Outcome.UNBOUNDED)
+            if f < 0.0:
+                raise Stop(Outcome.UNBOUNDED)
+            return None
         certificate = self._steps.certify(solved, equal)
         if not certificate.feasible:
             return None
-        return Point(solved, self._c.evaluate(solved.w).f, certificate, equal)
+        return Point(solved, f, certificate, equal)
 
     def _solve(self, w, zero, duals, **more):
         """Two stages where pairs are to be decided (eq. 13): with the penalty to read eta, then with what eta decides."""

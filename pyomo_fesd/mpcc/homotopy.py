@@ -88,7 +88,7 @@ class Homotopy:
         """Explore what the relaxation shows; the stage after it, or None."""
         self.end, options = relaxed, self._options
         at = self._c.evaluate(relaxed.w)
-        product = np.max(at.G * at.H, initial=0.0)
+        product = float(np.max(at.G * at.H, initial=0.0))
         sets = active_sets(at.G, at.H, self._steps.biactive(at))
         self._gap.add(stage.eps, at.f)
         last = stage.eps <= options.eps_final * ROUND_OFF

@@ -69,12 +69,14 @@ class HybridSolver:
 
     def _relaxation_only(self):
         """The homotopy alone, for comparison: nothing is exactly complementary and nothing is certified."""
-        self._homotopy.follow()
-        end = self._homotopy.end
-        if end is None:
-            return Outcome.INFEASIBLE
-        self.run.point = Point(end, self._c.evaluate(end.w).f, self._steps.measure(end))
-        return Outcome.RELAXED
+        try:
+            self._homotopy.follow()
+        finally:
+            # a limit, too, leaves the last relaxation
+            end = self._homotopy.end
+            if end is not None:
+                self.run.point = Point(end, self._c.evaluate(end.w).f, self._steps.measure(end))
+        return Outcome.INFEASIBLE if end is None else Outcome.RELAXED
 
     def _from_values(self):
         """Whether the branch that the start values name leads to a certified point."""

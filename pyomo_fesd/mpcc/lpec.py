@@ -198,9 +198,9 @@ class Lpec:
                 settings.pop('solver', None)
                 if target is not None:
                     settings['objective_target'] = target
-            if self._deadline.at is not None:
-                settings['time_limit'] = self._deadline.left()
             settings |= dict.fromkeys(TOLERANCES, attempt['tolerance']) | limits | self._options
+            if self._deadline.at is not None:
+                settings['time_limit'] = min(settings.get('time_limit', np.inf), self._deadline.left())
             for name, option in settings.items():
                 highs.setOptionValue(name, option)
             highs.passModel(lp)

@@ -140,6 +140,6 @@ class Penalty(Relaxation):
             w, duals = result.w, result
 
 
-#: option ``relaxation`` -> how it is built from a compiled MPCC, its its sides and what makes an NLP
+#: option ``relaxation`` -> how it is built from a compiled MPCC, its sides and what makes an NLP
 FORMS = (scholtes, scholtes_equality, lin_fukushima, kanzow_schwartz, steffensen_ulbrich, fischer_burmeister, l1, elastic)
 RELAXATIONS = {form.__name__: (Relaxation, form) for form in FORMS} | {'penalty': (Penalty, l1)}

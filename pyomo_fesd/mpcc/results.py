@@ -120,7 +120,8 @@ class Loader(SolutionLoader):
         if self._nlp is None:
             raise NoReducedCostsError()
         c = self._c
-        lam = -c.sign * self._nlp.lam_x * c.scale.x / c.scale.f
+        # a relaxation may have a slack behind the variables
+        lam = -c.sign * self._nlp.lam_x[: len(c.variables)] * c.scale.x / c.scale.f
         return _select(ComponentMap, c.variables, lam, vars_to_load)
 
     def load_vars(self, vars_to_load=None):
