@@ -57,10 +57,11 @@ class Homotopy:
         self._after, self.run = after, steps.run
         self._forms = (options.relaxation,) if options.relaxation != 'auto' else AUTO[compiled.has_objective]
         self._ladder = list(LADDER)
-        self.end = None
+        self.end, self.finished = None, False
 
     def follow(self):
-        """Run until the incumbent is settled or nothing is left to try; ``end`` is the last usable relaxation."""
+        """Run until the incumbent is settled or nothing is left to try; ``end`` is the last usable relaxation, ``finished`` whether it is that
+        of the last eps."""
         stage = _Stage(0, self._c.x0, self._options.eps_init)
         while stage is not None:
             self.run.eps = stage.eps
@@ -75,6 +76,7 @@ class Homotopy:
 
     def _recover(self, stage, relaxed):
         """The next step of the recovery ladder; None at its end, or where a certified incumbent makes it idle."""
+        self.finished = False
         self._after(self.run)
         if not self._ladder or self._certified():
             return None
@@ -91,7 +93,7 @@ class Homotopy:
         product = float(np.max(at.G * at.H, initial=0.0))
         sets = active_sets(at.G, at.H, self._steps.biactive(at))
         self._gap.add(stage.eps, at.f)
-        last = stage.eps <= options.eps_final * ROUND_OFF
+        self.finished = last = stage.eps <= options.eps_final * ROUND_OFF
         exhausted = product <= EXHAUSTED and sets.same_sides(stage.sets)
         ripe = self._branches is not None and (last or self._telling(stage, sets))
         if ripe:

@@ -76,7 +76,10 @@ class HybridSolver:
             end = self._homotopy.end
             if end is not None:
                 self.run.point = Point(end, self._c.evaluate(end.w).f, self._steps.measure(end))
-        return Outcome.INFEASIBLE if end is None else Outcome.RELAXED
+        if end is not None and (self._homotopy.finished or self.run.point.certificate.feasible):
+            return Outcome.RELAXED
+        self.run.point = None
+        return Outcome.INFEASIBLE
 
     def _from_values(self):
         """Whether the branch that the start values name leads to a certified point."""
