@@ -1,8 +1,8 @@
 """Depth-first search over the pairs, for problems whose feasible branches neither Reg(eps) nor the LPEC finds.
 
 A node fixes one side of some pairs to zero and asks only for G, H >= 0 of the others.  Its solution either violates no pair, and
-then names a branch, or it is split on the pair that it violates most, the side that is nearer to zero first.  A node without a
-feasible point is not followed: where the NLPs are convex, an exhausted search proves that there is no feasible branch.
+then names a branch, or it is split on the pair that it violates most, the side that is nearer to zero first.  A node for
+which no feasible point is found, from its parent's solution or from the start, is not followed: where the NLPs are convex, an exhausted search proves that there is no feasible branch.
 
 Source: Bard, Moore, SIAM J. Sci. Stat. Comput. 11 (1990) 281.
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 from pyomo_fesd.mpcc.active_set import FREE, G_ZERO, H_ZERO
 
-#: Nodes, and the iterations that each may use.
+#: Nodes, and the iterations that each attempt at one may use.
 NODES, ITERATIONS = 300, 100
 
 
@@ -37,6 +37,9 @@ def leaves(compiled, branch, w, tolerance):
             return
         start, zero = stack.pop()
         solved = branch(start, zero, None, 1.0, max_iter=ITERATIONS)
+        if solved is None and start is not w:
+            # the parent's solution can be a bad start: its sides are zero that now have to leave it
+            solved = branch(w, zero, None, 1.0, max_iter=ITERATIONS)
         if solved is None:
             continue
         at = compiled.evaluate(solved.w)

@@ -18,8 +18,8 @@ TOLERANCE = 1e-6
 SEARCH = 'search over the pairs'
 
 
-def lock(wrong=0.0):
-    """Each x_i is 0 or 1, and sum 2^i x_i^3 = K has one solution ``ANSWER``, or none; the objective leads away from it.
+def lock(wrong=0.0, answer=ANSWER):
+    """Each x_i is 0 or 1, and sum 2^i x_i^3 = K has one solution ``answer``, or none; the objective leads away from it.
 
     Linearised at x_i = 1/2 the sum says something else, so the LPEC names another branch or none.
     """
@@ -27,10 +27,10 @@ def lock(wrong=0.0):
     m.x = pyo.Var(pairs, bounds=(0, None), initialize=0.5)
     m.y = pyo.Var(pairs, bounds=(0, None), initialize=0.5)
     m.circle = pyo.Constraint(pairs, rule=lambda m, i: m.x[i] ** 2 + m.y[i] ** 2 == 1)
-    K = sum(2**i * on for i, on in enumerate(ANSWER)) + wrong
+    K = sum(2**i * on for i, on in enumerate(answer)) + wrong
     m.key = pyo.Constraint(expr=sum(2**i * m.x[i] ** 3 for i in pairs) == K)
     m.c = Complementarity(pairs, rule=lambda m, i: complements(m.x[i] >= 0, m.y[i] >= 0))
-    m.f = pyo.Objective(expr=sum((1 - 2 * ANSWER[i]) * (m.y[i] - m.x[i]) for i in pairs))
+    m.f = pyo.Objective(expr=sum((1 - 2 * answer[i]) * (m.y[i] - m.x[i]) for i in pairs))
     return m
 
 
@@ -42,6 +42,10 @@ def counted(branch, nodes):
         return branch(w, zero, *arguments, **more)
 
     return solve
+
+
+def distinct(nodes):
+    return len({zero.tobytes() for zero in nodes})
 
 
 def found(p, nodes, start=None):
@@ -60,13 +64,20 @@ def test_it_finds_the_only_feasible_branch():
     assert FREE not in zero
 
 
+@pytest.mark.parametrize('answer', [(0, 1, 0, 0, 1, 1), (1, 1, 0, 0, 1, 0), (0, 0, 0, 0, 0, 1), (1, 1, 1, 0, 0, 0)], ids=str)
+def test_the_solver_opens_other_locks(answer):
+    m = lock(answer=answer)
+    assert pyo.SolverFactory('mpec_hybrid').solve(m).solver.stationarity == 'B'
+    assert [m.x[i].value for i in m.x] == pytest.approx(answer, abs=1e-6)
+
+
 def test_it_starts_with_all_pairs_free_and_fixes_one_more_at_a_time():
     p, nodes = parts(lock()), []
     found(p, nodes)
     free = [np.count_nonzero(zero == FREE) for zero in nodes]
     assert free[0] == len(ANSWER)
     assert free[1] == len(ANSWER) - 1
-    assert len(nodes) == len({zero.tobytes() for zero in nodes}) <= 2 ** (len(ANSWER) + 1)
+    assert distinct(nodes) <= 2 ** (len(ANSWER) + 1)
 
 
 def test_the_solver_comes_to_it_where_relaxations_and_lpec_fail():
@@ -83,7 +94,7 @@ def test_the_solver_comes_to_it_where_relaxations_and_lpec_fail():
 def test_it_ends_exhausted_where_no_branch_is_feasible():
     p, nodes = parts(lock(wrong=0.5)), []
     assert found(p, nodes) == []
-    assert len(nodes) < search.NODES
+    assert distinct(nodes) < search.NODES
     p.branches.search(p.compiled.x0)
     assert p.run.point is None
 
@@ -102,7 +113,7 @@ def test_it_solves_no_more_nodes_than_it_may(monkeypatch, limit):
     monkeypatch.setattr(search, 'NODES', limit)
     p, nodes = parts(lock(wrong=0.5)), []
     assert found(p, nodes) == []
-    assert len(nodes) == limit
+    assert distinct(nodes) == limit
 
 
 def test_a_node_has_its_own_limit_of_iterations(monkeypatch):
@@ -123,6 +134,20 @@ def test_without_pairs_there_is_one_node():
     p, nodes = parts(mpcc_collection.plain_nlp()), []
     ((_, zero),) = found(p, nodes)
     assert (len(nodes), len(zero)) == (1, 0)
+
+
+def test_a_node_that_fails_from_its_parents_solution_is_tried_from_the_start():
+    p, starts = parts(lock(wrong=0.5)), []
+
+    def branch(w, zero, *arguments, **more):
+        starts.append((w, zero.copy()))
+        return None if np.count_nonzero(zero != FREE) == 1 else p.steps.branch(w, zero, *arguments, **more)
+
+    assert list(search.leaves(p.compiled, branch, p.compiled.x0, TOLERANCE)) == []
+    assert len(starts) == 5
+    for (first, zero), (second, again) in (starts[1:3], starts[3:5]):
+        np.testing.assert_array_equal(zero, again)
+        assert second is p.compiled.x0 and first is not second
 
 
 def test_what_the_search_finds_is_certified():
