@@ -60,8 +60,10 @@ class Homotopy:
         self.end, self.finished = None, False
 
     def follow(self):
-        """Run until the incumbent is settled or nothing is left to try; ``end`` is the last usable relaxation, ``finished`` whether it is that
-        of the last eps."""
+        """Run until the incumbent is settled or nothing is left to try.
+
+        ``end`` is the last usable relaxation, ``finished`` whether it is that of the last eps.
+        """
         stage = _Stage(0, self._c.x0, self._options.eps_init)
         while stage is not None:
             self.run.eps = stage.eps

@@ -1,8 +1,9 @@
 """Depth-first search over the pairs, for problems whose feasible branches neither Reg(eps) nor the LPEC finds.
 
-A node fixes one side of some pairs to zero and asks only for G, H >= 0 of the others.  Its solution either violates no pair, and
-then names a branch, or it is split on the pair that it violates most, the side that is nearer to zero first.  A node for
-which no feasible point is found, from its parent's solution or from the start, is not followed: where the NLPs are convex, an exhausted search proves that there is no feasible branch.
+A node fixes one side of some pairs to zero and asks only for G, H >= 0 of the others. Its solution either violates no pair, and
+then names a branch, or it is split on the pair that it violates most, the side that is nearer to zero first. A node for which
+no feasible point is found, from its parent's solution or from the start, is not followed: where the NLPs are convex, an
+exhausted search proves that there is no feasible branch.
 
 Source: Bard, Moore, SIAM J. Sci. Stat. Comput. 11 (1990) 281.
 """
