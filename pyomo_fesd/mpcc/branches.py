@@ -14,8 +14,8 @@ from pyomo_fesd.mpcc.stationarity import Stationarity
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
-#: Attempts at a branch NLP before it counts as infeasible, and the iterations that the early ones may use.
-TRIES, EARLY = 2, 60
+#: Attempts at a branch NLP before it counts as infeasible, and the iterations that they may use before the homotopy's end.
+TRIES, EARLY, PATIENT = 2, 30, 100
 #: The trust region of a descent step shrinks by this, so often.
 SHRINK, SHRINKS = 0.1, 3
 #: More bi-active pairs than this say little of the branch, and an LPEC over them takes long.
@@ -150,7 +150,8 @@ class Branches:
         key = zero.tobytes()
         self._tried[key] += 1
         again = self._tried[key] == TRIES
-        point = self._certified(w, zero, duals=None if again else duals, max_iter=None if final or again else EARLY)
+        budget = None if final else PATIENT if again else EARLY
+        point = self._certified(w, zero, duals=None if again else duals, max_iter=budget)
         if point is None and final and duals is not None and not again:
             point = self._certified(w, zero, duals=None)
         if point is not None and point.certificate.grade is not Stationarity.DESCENT:

@@ -18,9 +18,9 @@ from pyomo_fesd.mpcc.stationarity import certify, measure
 #: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
 BIACTIVE = 3.0
 
-#: HiGHS for an LPEC that only suggests a branch: the first that it finds will do, in the time that the NLPs took so far or this.
+#: HiGHS for an LPEC that only suggests a branch: the first that it finds will do, in this share of the time that the NLPs took.
 SUGGESTION = {'mip_max_nodes': 100, 'mip_max_improving_sols': 1, 'presolve': 'off'}
-LEAST_TIME = 0.1
+SHARE, LEAST_TIME = 0.2, 0.2
 
 #: What NLP solvers say of a problem that they found infeasible: the model's own rows may hold there, the pairs do not.
 INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
@@ -81,7 +81,7 @@ class Steps:
     def suggestion(self, w, sets, Delta):
         """An LPEC that may give up early."""
         spent = sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch'))
-        return self.lpec(w, sets, Delta, limits=SUGGESTION | {'time_limit': max(LEAST_TIME, spent)})
+        return self.lpec(w, sets, Delta, limits=SUGGESTION | {'time_limit': max(LEAST_TIME, SHARE * spent)})
 
     def certify(self, nlp, equal):
         """The certificate for the solution of a branch NLP.  No limit keeps it from being judged; HiGHS stops at the deadline."""
