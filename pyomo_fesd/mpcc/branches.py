@@ -160,6 +160,9 @@ class Branches:
 
     def _certified(self, w, zero, duals=None, **more):
         solved, equal = self._solve(w, zero, duals, **more)
+        if solved is not None and not solved.solved and more.get('max_iter') == EARLY:
+            # feasible, so it is the right branch, but not at its minimum yet
+            solved, equal = self._solve(solved.w, zero, solved, **more | {'max_iter': PATIENT})
         if solved is None:
             return None
         if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:

@@ -65,9 +65,17 @@ class Homotopy:
         while stage is not None:
             self.run.eps = stage.eps
             carried = stage.duals if stage.eps <= CARRIED * ROUND_OFF else None
-            relaxed = self._steps.relax(self._forms[stage.form], stage.w, stage.eps, carried)
+            relaxed = self._steps.relax(self._forms[stage.form], stage.w, stage.eps, carried, self._budget())
             self._steps.keep_least_infeasible(relaxed.w)
             stage = self._next(stage, relaxed) if self._steps.usable(relaxed) else self._recover(stage, relaxed)
+
+    def _budget(self):
+        """Iterations of a relaxation: the first of a run may use all that its solver has, and so may all if the user says how many."""
+        first = self.end is None and not self._ladder_used()
+        return None if first or 'max_iter' in self._options.nlp_options else self._options.relaxation_iterations
+
+    def _ladder_used(self):
+        return len(self._ladder) < len(LADDER)
 
     def restore(self, w):
         """The nearest point that the feasibility phase finds, with pairs as loose as at the start."""

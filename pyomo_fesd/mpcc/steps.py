@@ -26,6 +26,14 @@ SHARE, LEAST_TIME = 0.2, 0.2
 INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
 
 
+#: Iterations that an NLP may use; the first relaxation of a run may use more, it starts from afar.
+FIRST = 4
+ITERATIONS = {
+    'relaxation': lambda options: FIRST * options.relaxation_iterations,
+    'branch': lambda options: options.branch_iterations,
+}
+
+
 class Steps:
     """The NLPs and LPECs of one compiled MPCC, built when they are first needed.
 
@@ -53,11 +61,11 @@ class Steps:
 
     # what the algorithm calls
 
-    def relax(self, form, w, eps, duals):
+    def relax(self, form, w, eps, duals, max_iter):
         """Reg(eps) in a form of ``RELAXATIONS``, from ``w`` and perhaps a result of the same form."""
         kind, terms = RELAXATIONS[form]
         nlp = self._build(form, lambda make: kind(self._c, self._sides, terms, make), 'relaxation')
-        return self._nlp('relaxation', eps, lambda: nlp.solve(w, eps, duals))
+        return self._nlp('relaxation', eps, lambda: nlp.solve(w, eps, duals, max_iter))
 
     def restore(self, w, eps):
         """The feasibility phase."""
@@ -130,7 +138,7 @@ class Steps:
     def _make(self, kind, name, x, p, f, g, budget=None, derivatives=None):
         """An NLP solver of the user's choice, with the limits that its kind has."""
         options = self._options
-        ours = {'max_iter': getattr(options, f'{kind}_iterations'), 'tol': getattr(options, f'{kind}_tol')} | (budget or {})
+        ours = {'max_iter': ITERATIONS[kind](options), 'tol': getattr(options, f'{kind}_tol')} | (budget or {})
         return self._solver(name, x, p, f, g, ours, self._deadline, derivatives, options.nlp_options.value())
 
     def _nlp(self, kind, eps, solve):
