@@ -42,7 +42,7 @@ class Branches:
 
     def __init__(self, compiled, steps, tolerances, gap, far_sighted):
         self._c, self._steps, self._tolerances, self._gap = compiled, steps, tolerances, gap
-        self._far_sighted, self.run, self._tried = far_sighted, steps.run, Counter()
+        self._far_sighted, self.run, self._tried, self._solved = far_sighted, steps.run, Counter(), {}
 
     # what the algorithm calls
 
@@ -57,12 +57,18 @@ class Branches:
             at this point
         final : bool
             whether the homotopy ends here: no budget, and every descent is followed
+
+        Returns
+        -------
+        float or None
+            the objective of the branch that the sets name, if it has a certified solution
         """
         point = self._point(relaxed.w, sets.zero, relaxed, final)
         if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
             zero = self._steps.suggestion(relaxed.w, sets, self._tolerances.radius).zero
             point = self._point(relaxed.w, zero, relaxed, final)
         self._improve_from(point, final)
+        return self._solved.get(sets.zero.tobytes())
 
     def explore_from(self, w, final):
         """Solve the branch that the values ``w`` name."""
@@ -155,7 +161,7 @@ class Branches:
         if point is None and final and duals is not None and not again:
             point = self._certified(w, zero, duals=None)
         if point is not None and point.certificate.grade is not Stationarity.DESCENT:
-            self._tried[key] = TRIES
+            self._tried[key], self._solved[key] = TRIES, point.f
         return point
 
     def _certified(self, w, zero, duals=None, **more):

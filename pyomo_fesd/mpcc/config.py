@@ -48,10 +48,10 @@ OPTIONS = (
     ),
     (
         'lpec',
-        'reduced',
-        In(['reduced', 'full']),
+        'auto',
+        In(['auto', 'reduced', 'full']),
         "'reduced': binaries for bi-active pairs only; 'full': also an LPEC with a binary for every pair that looks for a better "
-        "branch within the trust region after each certificate",
+        "branch within the trust region after each certificate; 'auto': full for up to 50 pairs",
     ),
     (
         'warm_start',

@@ -35,6 +35,7 @@ class _Stage:
     eps: float
     duals: NlpResult = None
     sets: ActiveSets = None
+    named: float = None
 
 
 class Homotopy:
@@ -102,22 +103,27 @@ class Homotopy:
         last = stage.eps <= options.eps_final * ROUND_OFF
         exhausted = product <= EXHAUSTED and sets.same_sides(stage.sets)
         ripe = self._branches is not None and (last or self._telling(stage, sets))
-        if ripe:
-            self._branches.explore(relaxed, sets, last or exhausted)
+        named = self._branches.explore(relaxed, sets, last or exhausted) if ripe else None
         self._after(self.run)
-        if ripe and self._certified() and self._gap.closed(self.run.point.f):
+        if ripe and self._certified() and (self._gap.closed(self.run.point.f) or self._again(stage.named, named)):
             return None
         if last or (exhausted and ripe and self._branches.tried(sets.zero)):
             return self._other_form(stage, relaxed)
         # nothing changes before eps falls below the largest product
         eps = max(min(stage.eps, product) * options.eps_factor, options.eps_final)
-        return _Stage(stage.form, relaxed.w, eps, relaxed, sets)
+        return _Stage(stage.form, relaxed.w, eps, relaxed, sets, named)
 
     def _telling(self, stage, sets):
         """Whether the active sets are worth a branch NLP."""
         undecided = np.count_nonzero(sets.gamma)
         late = stage.eps <= TELLING * ROUND_OFF and undecided <= UNDECIDED * len(sets.gamma)
         return late or not undecided or sets.same_sides(stage.sets)
+
+    def _again(self, before, now):
+        """Whether two relaxations in a row have named the incumbent, or what is as good."""
+        best = self.run.point.f
+        same = self._options.gap_tol * abs(best)
+        return None not in (before, now) and max(before, now) - best <= same
 
     def _other_form(self, stage, relaxed):
         """Where a path ends with nothing feasible the other form takes another one."""
