@@ -71,12 +71,9 @@ class Homotopy:
             stage = self._next(stage, relaxed) if self._steps.usable(relaxed) else self._recover(stage, relaxed)
 
     def _budget(self):
-        """Iterations of a relaxation: the first of a run may use all that its solver has, and so may all if the user says how many."""
-        first = self.end is None and not self._ladder_used()
+        """Iterations of a relaxation; None, for all that the solver has, where it starts from afar or the user has set them."""
+        first = self.end is None and len(self._ladder) == len(LADDER)
         return None if first or 'max_iter' in self._options.nlp_options else self._options.relaxation_iterations
-
-    def _ladder_used(self):
-        return len(self._ladder) < len(LADDER)
 
     def restore(self, w):
         """The nearest point that the feasibility phase finds, with pairs as loose as at the start."""
