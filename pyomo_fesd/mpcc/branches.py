@@ -14,8 +14,8 @@ from pyomo_fesd.mpcc.stationarity import Stationarity
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
-#: Attempts at a branch NLP before it counts as infeasible, and the iterations that the early ones may use.
-TRIES, EARLY = 2, 60
+#: Attempts at a branch NLP before it counts as infeasible, and the iterations that they may use before the homotopy's end.
+TRIES, EARLY, PATIENT = 2, 30, 100
 #: The trust region of a descent step shrinks by this, so often.
 SHRINK, SHRINKS = 0.1, 3
 #: More bi-active pairs than this say little of the branch, and an LPEC over them takes long.
@@ -43,7 +43,7 @@ class Branches:
 
     def __init__(self, compiled, steps, tolerances, gap, far_sighted):
         self._c, self._steps, self._tolerances, self._gap = compiled, steps, tolerances, gap
-        self._far_sighted, self.run, self._tried = far_sighted, steps.run, Counter()
+        self._far_sighted, self.run, self._tried, self._solved = far_sighted, steps.run, Counter(), {}
 
     # what the algorithm calls
 
@@ -58,12 +58,18 @@ class Branches:
             at this point
         final : bool
             whether the homotopy ends here: no budget, and every descent is followed
+
+        Returns
+        -------
+        float or None
+            the objective of the branch that the sets name, if it has a certified solution
         """
         point = self._point(relaxed.w, sets.zero, relaxed, final)
         if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
             zero = self._steps.suggestion(relaxed.w, sets, self._tolerances.radius).zero
             point = self._point(relaxed.w, zero, relaxed, final)
         self._improve_from(point, final)
+        return self._solved.get(sets.zero.tobytes())
 
     def explore_from(self, w, final):
         """Solve the branch that the values ``w`` name."""
@@ -154,15 +160,19 @@ class Branches:
         key = zero.tobytes()
         self._tried[key] += 1
         again = self._tried[key] == TRIES
-        point = self._certified(w, zero, duals=None if again else duals, max_iter=None if final or again else EARLY)
+        budget = None if final else PATIENT if again else EARLY
+        point = self._certified(w, zero, duals=None if again else duals, max_iter=budget)
         if point is None and final and duals is not None and not again:
             point = self._certified(w, zero, duals=None)
         if point is not None and point.certificate.grade is not Stationarity.DESCENT:
-            self._tried[key] = TRIES
+            self._tried[key], self._solved[key] = TRIES, point.f
         return point
 
     def _certified(self, w, zero, duals=None, **more):
         solved, equal = self._solve(w, zero, duals, **more)
+        if solved is not None and not solved.solved and more.get('max_iter') == EARLY:
+            # feasible, so it is the right branch, but not at its minimum yet
+            solved, equal = self._solve(solved.w, zero, solved, **more | {'max_iter': PATIENT})
         if solved is None:
             return None
         f = self._c.evaluate(solved.w).f

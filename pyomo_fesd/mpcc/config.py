@@ -48,10 +48,10 @@ OPTIONS = (
     ),
     (
         'lpec',
-        'reduced',
-        In(['reduced', 'full']),
+        'auto',
+        In(['auto', 'reduced', 'full']),
         "'reduced': binaries for bi-active pairs only; 'full': also an LPEC with a binary for every pair that looks for a better "
-        "branch within the trust region after each certificate",
+        "branch within the trust region after each certificate; 'auto': full for up to 50 pairs",
     ),
     (
         'warm_start',
@@ -68,7 +68,7 @@ OPTIONS = (
         "executable that reads NL files and that Pyomo knows, e.g. 'pounce', 'asl:ipopt'",
     ),
     ('relaxation_tol', 1e-4, PositiveFloat, "Ipopt's tol for relaxations, which only lead to a branch"),
-    ('relaxation_iterations', 500, PositiveInt, "Ipopt iterations allowed to one relaxation"),
+    ('relaxation_iterations', 500, PositiveInt, "Ipopt iterations allowed to one relaxation; the first may use four times as many"),
     ('gap_tol', 5e-5, PositiveFloat, "gap test: relative distance of incumbent and relaxed objective that ends a run"),
     ('feasibility_tol', 1e-6, PositiveFloat, "largest scaled violation and complementarity of a reported point"),
     ('biactive_tol', 1e-6, PositiveFloat, "sides below this are both zero at a branch solution (eq. 16)"),

@@ -35,6 +35,7 @@ class _Stage:
     eps: float
     duals: NlpResult = None
     sets: ActiveSets = None
+    named: float = None
 
 
 class Homotopy:
@@ -68,9 +69,14 @@ class Homotopy:
         while stage is not None:
             self.run.eps = stage.eps
             carried = stage.duals if stage.eps <= CARRIED * ROUND_OFF else None
-            relaxed = self._steps.relax(self._forms[stage.form], stage.w, stage.eps, carried)
+            relaxed = self._steps.relax(self._forms[stage.form], stage.w, stage.eps, carried, self._budget())
             self._steps.keep_least_infeasible(relaxed.w)
             stage = self._next(stage, relaxed) if self._steps.usable(relaxed) else self._recover(stage, relaxed)
+
+    def _budget(self):
+        """Iterations of a relaxation; None, for all that the solver has, where it starts from afar or the user has set them."""
+        first = self.end is None and len(self._ladder) == len(LADDER)
+        return None if first or 'max_iter' in self._options.nlp_options else self._options.relaxation_iterations
 
     def restore(self, w):
         """The nearest point that the feasibility phase finds, with pairs as loose as at the start."""
@@ -98,22 +104,27 @@ class Homotopy:
         self.finished = last = stage.eps <= options.eps_final * ROUND_OFF
         exhausted = product <= EXHAUSTED and sets.same_sides(stage.sets)
         ripe = self._branches is not None and (last or self._telling(stage, sets))
-        if ripe:
-            self._branches.explore(relaxed, sets, last or exhausted)
+        named = self._branches.explore(relaxed, sets, last or exhausted) if ripe else None
         self._after(self.run)
-        if ripe and self._certified() and self._gap.closed(self.run.point.f):
+        if ripe and self._certified() and (self._gap.closed(self.run.point.f) or self._again(stage.named, named)):
             return None
         if last or (exhausted and ripe and self._branches.tried(sets.zero)):
             return self._other_form(stage, relaxed)
         # nothing changes before eps falls below the largest product
         eps = max(min(stage.eps, product) * options.eps_factor, options.eps_final)
-        return _Stage(stage.form, relaxed.w, eps, relaxed, sets)
+        return _Stage(stage.form, relaxed.w, eps, relaxed, sets, named)
 
     def _telling(self, stage, sets):
         """Whether the active sets are worth a branch NLP."""
         undecided = np.count_nonzero(sets.gamma)
         late = stage.eps <= TELLING * ROUND_OFF and undecided <= UNDECIDED * len(sets.gamma)
         return late or not undecided or sets.same_sides(stage.sets)
+
+    def _again(self, before, now):
+        """Whether two relaxations in a row have named the incumbent, or what is as good."""
+        best = self.run.point.f
+        same = self._options.gap_tol * abs(best)
+        return None not in (before, now) and max(before, now) - best <= same
 
     def _other_form(self, stage, relaxed):
         """Where a path ends with nothing feasible the other form takes another one."""

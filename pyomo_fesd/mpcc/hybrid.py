@@ -10,6 +10,13 @@ from pyomo_fesd.mpcc.homotopy import Homotopy
 from pyomo_fesd.mpcc.run import Outcome, Point, Run, Stop, Tolerances
 from pyomo_fesd.mpcc.steps import Steps
 
+#: option ``lpec`` -> whether a full LPEC, which few pairs make cheap, looks for better branches
+FAR_SIGHTED = {
+    'auto': lambda compiled: len(compiled.side_of) // 2 <= 50,
+    'full': lambda compiled: True,
+    'reduced': lambda compiled: False,
+}
+
 
 class HybridSolver:
     """Runs the algorithm on a compiled MPCC.
@@ -37,7 +44,7 @@ class HybridSolver:
         self.run = Run()
         self._steps = Steps(compiled, options, tolerances, self.run, timer, show, deadline, built)
         gap = GapTest(options.gap_tol * 1e-2, options.gap_tol)
-        self._branches = Branches(compiled, self._steps, tolerances, gap, options.lpec == 'full')
+        self._branches = Branches(compiled, self._steps, tolerances, gap, FAR_SIGHTED[options.lpec](compiled))
         judge = self._branches if options.mode == 'hybrid' else None
         self._homotopy = Homotopy(compiled, options, self._steps, gap, judge, after)
 

@@ -16,7 +16,7 @@ class Recovery:
     ----------
     what : str
         as the log says it
-    start : callable (start of the run, last point, solver) -> array
+    start : callable (start of the run, last point, homotopy) -> array
     eps : callable (first eps, last eps, factor) -> float
     other_form : bool
         whether the next form of Reg(eps) takes over
@@ -28,14 +28,19 @@ class Recovery:
     other_form: bool = False
 
 
-def _perturbed(w0, w, solver):
+def _perturbed(w0, w, homotopy):
     return w0 + SIZE * np.maximum(1.0, np.abs(w0)) * np.random.default_rng(SEED).standard_normal(len(w0))
 
 
+def _before(w0, w, homotopy):
+    return w0 if homotopy.end is None else homotopy.end.w
+
+
 LADDER = (
-    Recovery("go on with a smaller eps", lambda w0, w, solver: w, lambda first, last, factor: last * factor),
-    Recovery("start again, other form", lambda w0, w, solver: w0, lambda first, last, factor: first * 1e-2, other_form=True),
-    Recovery("restore feasibility, raise eps", lambda w0, w, solver: solver.restore(w), lambda first, last, factor: first * 10),
+    Recovery("back to the last relaxation, half a step", _before, lambda first, last, factor: last * factor**-0.5),
+    Recovery("go on with a smaller eps", lambda w0, w, homotopy: w, lambda first, last, factor: last * factor),
+    Recovery("start again, other form", lambda w0, w, homotopy: w0, lambda first, last, factor: first * 1e-2, other_form=True),
+    Recovery("restore feasibility, raise eps", lambda w0, w, homotopy: homotopy.restore(w), lambda first, last, factor: first * 10),
     Recovery("perturb the start", _perturbed, lambda first, last, factor: first * 1e-2),
-    Recovery("raise eps, other form", lambda w0, w, solver: w0, lambda first, last, factor: first * 100, other_form=True),
+    Recovery("raise eps, other form", lambda w0, w, homotopy: w0, lambda first, last, factor: first * 100, other_form=True),
 )

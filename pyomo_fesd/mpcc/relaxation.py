@@ -100,7 +100,7 @@ class Relaxation:
         nlp = composed(c, 1.0, Outer(z, slack, ca.SX(terms.cost), ca.vertcat(z[sides.chosen.tolist()], terms.rows)))
         self._nlp = make(form.__name__, nlp.x, ca.vertcat(eps, c.p), nlp.f, nlp.g, LEADING, nlp.derivatives)
 
-    def solve(self, w, eps, duals=None):
+    def solve(self, w, eps, duals=None, max_iter=None):
         """Solve from ``w``, with the multipliers of an earlier result of this form if given."""
         c = self._c
         lbx, ubx = c.lbx, c.guide_ubx
@@ -108,7 +108,7 @@ class Relaxation:
             at = c.evaluate(w)
             w = np.append(w, min(1.0, (at.G * at.H).max(initial=0.0) + ROOM))
             lbx, ubx = np.append(lbx, 0.0), np.append(ubx, np.inf)
-        result = self._nlp.solve(w, [eps, *c.parameters], lbx, ubx, self._lbg, self._ubg, duals)
+        result = self._nlp.solve(w, [eps, *c.parameters], lbx, ubx, self._lbg, self._ubg, duals, max_iter)
         return result.shortened(len(c.x0))
 
 
@@ -125,13 +125,13 @@ class Penalty(Relaxation):
         super().__init__(c, sides, form, make)
         self._rho = self.START
 
-    def solve(self, w, eps, duals=None):
+    def solve(self, w, eps, duals=None, max_iter=None):
         """Solve from ``w`` with the weight that brings every product to ``eps``; without multipliers a new path begins."""
         if duals is None:
             self._rho = self.START
         spent = 0
         while True:
-            result = super().solve(w, 1 / self._rho, duals)
+            result = super().solve(w, 1 / self._rho, duals, max_iter)
             spent += result.iterations
             at = self._c.evaluate(result.w)
             if not result.solved or (at.G * at.H).max(initial=0.0) <= eps or self._rho >= self.LIMIT:

@@ -18,12 +18,20 @@ from pyomo_fesd.mpcc.stationarity import certify, measure
 #: Both sides within this factor of the root of the largest product: which of them goes to zero is not decided yet.
 BIACTIVE = 3.0
 
-#: HiGHS for an LPEC that only suggests a branch: the first that it finds will do, in the time that the NLPs took so far or this.
+#: HiGHS for an LPEC that only suggests a branch: the first that it finds will do, in this share of the time that the NLPs took.
 SUGGESTION = {'mip_max_nodes': 100, 'mip_max_improving_sols': 1, 'presolve': 'off'}
-LEAST_TIME = 0.1
+SHARE, LEAST_TIME = 0.2, 0.2
 
 #: What NLP solvers say of a problem that they found infeasible: the model's own rows may hold there, the pairs do not.
 INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
+
+
+#: Iterations that an NLP may use; the first relaxation of a run may use more, it starts from afar.
+FIRST = 4
+ITERATIONS = {
+    'relaxation': lambda options: FIRST * options.relaxation_iterations,
+    'branch': lambda options: options.branch_iterations,
+}
 
 
 class Steps:
@@ -53,11 +61,11 @@ class Steps:
 
     # what the algorithm calls
 
-    def relax(self, form, w, eps, duals):
+    def relax(self, form, w, eps, duals, max_iter):
         """Reg(eps) in a form of ``RELAXATIONS``, from ``w`` and perhaps a result of the same form."""
         kind, terms = RELAXATIONS[form]
         nlp = self._build(form, lambda make: kind(self._c, self._sides, terms, make), 'relaxation')
-        return self._nlp('relaxation', eps, lambda: nlp.solve(w, eps, duals))
+        return self._nlp('relaxation', eps, lambda: nlp.solve(w, eps, duals, max_iter))
 
     def restore(self, w, eps):
         """The feasibility phase."""
@@ -81,7 +89,7 @@ class Steps:
     def suggestion(self, w, sets, Delta):
         """An LPEC that may give up early."""
         spent = sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch'))
-        return self.lpec(w, sets, Delta, limits=SUGGESTION | {'time_limit': max(LEAST_TIME, spent)})
+        return self.lpec(w, sets, Delta, limits=SUGGESTION | {'time_limit': max(LEAST_TIME, SHARE * spent)})
 
     def certify(self, nlp, equal):
         """The certificate for the solution of a branch NLP.  No limit keeps it from being judged; HiGHS stops at the deadline."""
@@ -130,7 +138,7 @@ class Steps:
     def _make(self, kind, name, x, p, f, g, budget=None, derivatives=None):
         """An NLP solver of the user's choice, with the limits that its kind has."""
         options = self._options
-        ours = {'max_iter': getattr(options, f'{kind}_iterations'), 'tol': getattr(options, f'{kind}_tol')} | (budget or {})
+        ours = {'max_iter': ITERATIONS[kind](options), 'tol': getattr(options, f'{kind}_tol')} | (budget or {})
         return self._solver(name, x, p, f, g, ours, self._deadline, derivatives, options.nlp_options.value())
 
     def _nlp(self, kind, eps, solve):
