@@ -33,8 +33,8 @@ def two_minima(x0=0.0, y0=1.0):
 
 
 def at_point(m, final, **options):
-    """Parts after ``explore_from`` the model's values."""
-    p = parts(m, **options)
+    """Parts after ``explore_from`` the model's values; near-sighted unless told otherwise."""
+    p = parts(m, **{'lpec': 'reduced'} | options)
     p.branches.explore_from(p.compiled.x0, final)
     return p
 
@@ -62,7 +62,7 @@ def test_it_is_kept_uncertified_while_the_homotopy_promises_something_better():
 
 
 def test_a_closed_gap_lets_it_descend():
-    p = parts(trap())
+    p = parts(trap(), lpec='reduced')
     p.gap.add(1e-3, 1.0)
     p.branches.explore_from(p.compiled.x0, False)
     assert p.run.point.certificate.certified
@@ -101,14 +101,14 @@ def test_a_branch_that_fails_gets_as_many_tries_as_are_set():
 
 
 def test_certified_comes_before_a_lower_objective():
-    p = parts(two_minima())
+    p = parts(two_minima(), lpec='reduced')
     for x, y in ((0.0, 1.0), (1.0, 0.0), (0.0, 1.0)):
         p.branches.explore_from(np.array(p.point(x=x, y=y)), False)
     assert p.run.point.f == pytest.approx(0.5)
     assert p.run.point.certificate.certified
 
 
-@pytest.mark.parametrize(('lpec', 'best'), [('reduced', 1.0), ('full', 0.5)])
+@pytest.mark.parametrize(('lpec', 'best'), [('reduced', 1.0), ('full', 0.5), ('auto', 0.5)])
 def test_only_the_full_lpec_looks_beyond_a_strict_minimum(lpec, best):
     p = at_point(two_minima(), False, lpec=lpec)
     assert p.run.point.certificate.grade is Stationarity.B
@@ -141,7 +141,7 @@ def test_without_an_own_solution_the_lpec_names_another_branch():
     m.row = pyo.Constraint(expr=m.x - m.y >= 0.05)
     m.f = pyo.Objective(expr=(m.x - 1) ** 2 + m.y)
     p = parts(m)
-    relaxed = p.steps.relax('scholtes', p.compiled.x0, 1e-2, None)
+    relaxed = p.steps.relax('scholtes', p.compiled.x0, 1e-2, None, None)
     p.branches.explore(relaxed, active_sets(np.zeros(1), np.full(1, 1e-3), 1.0), False)
     assert p.kinds('lpec')
     assert p.run.point.w == pytest.approx(p.point(x=1.0, y=0.0), abs=1e-6)

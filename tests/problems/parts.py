@@ -11,6 +11,7 @@ from pyomo_fesd.mpcc.compiled import Compiled
 from pyomo_fesd.mpcc.config import MpecHybridConfig
 from pyomo_fesd.mpcc.deadline import Deadline
 from pyomo_fesd.mpcc.gap import GapTest
+from pyomo_fesd.mpcc.hybrid import FAR_SIGHTED
 from pyomo_fesd.mpcc.parameters import parameter_data
 from pyomo_fesd.mpcc.problem import read_problem
 from pyomo_fesd.mpcc.run import Run, Tolerances
@@ -50,4 +51,4 @@ def parts(model, **options):
     tolerances = Tolerances(config.feasibility_tol, config.biactive_tol, config.descent_tol, config.eta_tol, config.trust_radius)
     steps = Steps(c, config, tolerances, run, HierarchicalTimer(), lambda step: None, Deadline(), built)
     gap = GapTest(config.gap_tol * 1e-2, config.gap_tol)
-    return Parts(c, run, steps, gap, Branches(c, steps, tolerances, gap, config.lpec == 'full'))
+    return Parts(c, run, steps, gap, Branches(c, steps, tolerances, gap, FAR_SIGHTED[config.lpec](c)))
