@@ -26,10 +26,10 @@ SHARE, LEAST_TIME = 0.2, 0.2
 INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
 
 
-#: Iterations that an NLP may use; the first relaxation of a run may use more, it starts from afar.
-FIRST = 4
+#: Iterations that an NLP may use; a relaxation without multipliers to start from may use more.
+COLD = 4
 ITERATIONS = {
-    'relaxation': lambda options: FIRST * options.relaxation_iterations,
+    'relaxation': lambda options: COLD * options.relaxation_iterations,
     'branch': lambda options: options.branch_iterations,
 }
 
