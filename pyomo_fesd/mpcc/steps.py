@@ -61,7 +61,7 @@ class Steps:
 
     # what the algorithm calls
 
-    def relax(self, form, w, eps, duals, max_iter):
+    def relax(self, form, w, eps, duals, max_iter=None):
         """Reg(eps) in a form of ``RELAXATIONS``, from ``w`` and perhaps a result of the same form."""
         kind, terms = RELAXATIONS[form]
         nlp = self._build(form, lambda make: kind(self._c, self._sides, terms, make), 'relaxation')
