@@ -14,8 +14,10 @@ from pyomo_fesd.mpcc.stationarity import Stationarity
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
-#: Attempts at a branch NLP before it counts as infeasible, and the iterations that they may use before the homotopy's end.
+#: Attempts at a branch NLP before it counts as infeasible; the iterations of the first and the second; and how many more where
+#: they only lead to a feasible point (None: all that the solver has).
 TRIES, EARLY, PATIENT = 2, 30, 100
+MORE = {EARLY: PATIENT, PATIENT: None}
 #: The trust region of a descent step shrinks by this, so often.
 SHRINK, SHRINKS = 0.1, 3
 #: More bi-active pairs than this say little of the branch, and an LPEC over them takes long.
@@ -68,7 +70,8 @@ class Branches:
         if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
             zero = self._steps.suggestion(relaxed.w, sets, self._tolerances.radius).zero
             point = self._point(relaxed.w, zero, relaxed, final)
-        self._improve_from(point, final)
+        # the far-sighted do not wait: a point that the homotopy settles later is not solved again, nor looked from
+        self._improve_from(point, final or self._far_sighted)
         return self._solved.get(sets.zero.tobytes())
 
     def explore_from(self, w, final):
@@ -102,13 +105,10 @@ class Branches:
         return self.run.point is not None
 
     def _improve_from(self, point, final):
-        """Keep ``point`` and what descends from it, while the homotopy does not promise something much better.
-
-        The far-sighted do not wait for the homotopy: a point that it settles later is not solved again, nor looked from.
-        """
+        """Keep ``point`` and what descends from it, while the homotopy does not promise something much better."""
         while point is not None:
             self._keep(point)
-            point = self._descend(point) if final or self._far_sighted or self._gap.closed(point.f) else None
+            point = self._descend(point) if final or self._gap.closed(point.f) else None
 
     def _keep(self, point):
         """Keep the better of the incumbent and ``point``: certified before uncertified, then the lower objective."""
@@ -160,7 +160,7 @@ class Branches:
         key = zero.tobytes()
         self._tried[key] += 1
         again = self._tried[key] == TRIES
-        budget = None if final else PATIENT if again else EARLY
+        budget = PATIENT if final or again else EARLY
         point = self._certified(w, zero, duals=None if again else duals, max_iter=budget)
         if point is None and final and duals is not None and not again:
             point = self._certified(w, zero, duals=None)
@@ -170,9 +170,9 @@ class Branches:
 
     def _certified(self, w, zero, duals=None, **more):
         solved, equal = self._solve(w, zero, duals, **more)
-        if solved is not None and not solved.solved and more.get('max_iter') == EARLY:
-            # feasible, so it is the right branch, but not at its minimum yet
-            solved, equal = self._solve(solved.w, zero, solved, **more | {'max_iter': PATIENT})
+        if solved is not None and not solved.solved and more.get('max_iter') in MORE:
+            # feasible, so the branch has a solution, but not at its minimum yet
+            solved, equal = self._solve(solved.w, zero, solved, **more | {'max_iter': MORE[more['max_iter']]})
         if solved is None:
             return None
         f = self._c.evaluate(solved.w).f

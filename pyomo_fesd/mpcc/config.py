@@ -68,7 +68,12 @@ OPTIONS = (
         "executable that reads NL files and that Pyomo knows, e.g. 'pounce', 'asl:ipopt'",
     ),
     ('relaxation_tol', 1e-4, PositiveFloat, "Ipopt's tol for relaxations, which only lead to a branch"),
-    ('relaxation_iterations', 500, PositiveInt, "Ipopt iterations allowed to one relaxation; the first may use four times as many"),
+    (
+        'relaxation_iterations',
+        500,
+        PositiveInt,
+        "Ipopt iterations allowed to one relaxation; the first ones, which start from afar, may use four times as many",
+    ),
     ('gap_tol', 5e-5, PositiveFloat, "gap test: relative distance of incumbent and relaxed objective that ends a run"),
     ('feasibility_tol', 1e-6, PositiveFloat, "largest scaled violation and complementarity of a reported point"),
     ('biactive_tol', 1e-6, PositiveFloat, "sides below this are both zero at a branch solution (eq. 16)"),

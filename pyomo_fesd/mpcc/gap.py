@@ -41,6 +41,5 @@ class GapTest:
         if len(self._path) < 2:
             return 0.0
         (eps_before, before), (eps, now) = self._path[-2:]
-        if eps >= eps_before:
-            return 0.0
-        return max(now - before, 0.0) / (np.sqrt(eps_before / eps) - 1)
+        growth = np.sqrt(eps_before / eps) - 1
+        return max(now - before, 0.0) / growth if growth > 0.0 else 0.0

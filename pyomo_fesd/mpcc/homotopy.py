@@ -69,14 +69,13 @@ class Homotopy:
         while stage is not None:
             self.run.eps = stage.eps
             carried = stage.duals if stage.eps <= CARRIED * ROUND_OFF else None
-            relaxed = self._steps.relax(self._forms[stage.form], stage.w, stage.eps, carried, self._budget())
+            relaxed = self._steps.relax(self._forms[stage.form], stage.w, stage.eps, carried, self._budget(carried))
             self._steps.keep_least_infeasible(relaxed.w)
             stage = self._next(stage, relaxed) if self._steps.usable(relaxed) else self._recover(stage, relaxed)
 
-    def _budget(self):
+    def _budget(self, carried):
         """Iterations of a relaxation; None, for all that the solver has, where it starts from afar or the user has set them."""
-        first = self.end is None and len(self._ladder) == len(LADDER)
-        return None if first or 'max_iter' in self._options.nlp_options else self._options.relaxation_iterations
+        return None if carried is None or 'max_iter' in self._options.nlp_options else self._options.relaxation_iterations
 
     def restore(self, w):
         """The nearest point that the feasibility phase finds, with pairs as loose as at the start."""

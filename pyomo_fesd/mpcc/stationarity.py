@@ -83,8 +83,7 @@ def certify(c, lpec, w, tolerances, equal=None, multipliers=None):
     """
     at = c.evaluate(w)
     grad, J_g, J_G, J_H, _ = c.gradients(w)
-    sets = active_sets(at.G, at.H, tolerances.biactive)
-    measures = _measures(c, at, w, sets, (J_g, J_G, J_H))
+    sets, measures = _judged(c, at, w, tolerances, (J_g, J_G, J_H))
     if max(measures[-2:]) > tolerances.feasibility:
         return Certificate(Stationarity.INFEASIBLE, 0.0, None, *measures)
     if not grad.any():
@@ -107,13 +106,16 @@ def certify(c, lpec, w, tolerances, equal=None, multipliers=None):
 def measure(c, w, tolerances):
     """The residuals of a point that is not judged, as a ``Certificate`` without an LPEC."""
     at, (_, J_g, J_G, J_H, _) = c.evaluate(w), c.gradients(w)
-    measures = _measures(c, at, w, active_sets(at.G, at.H, tolerances.biactive), (J_g, J_G, J_H))
+    _, measures = _judged(c, at, w, tolerances, (J_g, J_G, J_H))
     feasible = max(measures[-2:]) <= tolerances.feasibility
     return Certificate(Stationarity.RELAXED if feasible else Stationarity.INFEASIBLE, 0.0, None, *measures)
 
 
-def _measures(c, at, w, sets, jacobians):
-    """Bi-active pairs; violation and complementarity, absolute and scaled."""
+def _judged(c, at, w, tolerances, jacobians):
+    """Active sets; and bi-active pairs, violation and complementarity, absolute and scaled.
+
+    Where rows are violated by v, sides that count as zero are only known to O(sqrt(v)).
+    """
     J_g, J_G, J_H = jacobians
     rows, bounds = c.violations(w, at)
     low = np.minimum(at.G, at.H)
@@ -123,7 +125,8 @@ def _measures(c, at, w, sets, jacobians):
     violation = max(rows_abs.max(initial=0.0), bounds_abs.max(initial=0.0), -low_abs.min(initial=0.0))
     scaled = max(np.max(rows / _scale(J_g), initial=0.0), negative)
     gap = float(np.max(np.abs(low) / np.minimum(_scale(J_G), _scale(J_H)), initial=0.0))
-    return int(sets.gamma.sum()), float(violation), float(np.abs(low_abs).max(initial=0.0)), float(scaled), gap
+    sets = active_sets(at.G, at.H, max(tolerances.biactive, np.sqrt(scaled)))
+    return sets, (int(sets.gamma.sum()), float(violation), float(np.abs(low_abs).max(initial=0.0)), float(scaled), gap)
 
 
 def _scale(J):

@@ -26,10 +26,10 @@ SHARE, LEAST_TIME = 0.2, 0.2
 INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
 
 
-#: Iterations that an NLP may use; the first relaxation of a run may use more, it starts from afar.
-FIRST = 4
+#: Iterations that an NLP may use; a relaxation without multipliers to start from may use more.
+COLD = 4
 ITERATIONS = {
-    'relaxation': lambda options: FIRST * options.relaxation_iterations,
+    'relaxation': lambda options: COLD * options.relaxation_iterations,
     'branch': lambda options: options.branch_iterations,
 }
 
@@ -61,7 +61,7 @@ class Steps:
 
     # what the algorithm calls
 
-    def relax(self, form, w, eps, duals, max_iter):
+    def relax(self, form, w, eps, duals, max_iter=None):
         """Reg(eps) in a form of ``RELAXATIONS``, from ``w`` and perhaps a result of the same form."""
         kind, terms = RELAXATIONS[form]
         nlp = self._build(form, lambda make: kind(self._c, self._sides, terms, make), 'relaxation')

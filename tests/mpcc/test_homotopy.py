@@ -75,7 +75,7 @@ def test_a_failed_relaxation_climbs_the_ladder_from_its_first_step():
     notes = [step.status for step in results.extra_info.steps if step.kind == 'recovery']
     assert notes[: len(LADDER)] == [step.what for step in LADDER]
     eps = [step.eps for step in relaxations(results)]
-    assert eps[2] == pytest.approx(eps[1] * 10**0.5)
+    assert eps[2] == pytest.approx(eps[1] / np.sqrt(0.1))
     assert max(eps) == 100
     assert notes[len(LADDER) :] == ['search over the pairs']
 
