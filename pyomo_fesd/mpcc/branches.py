@@ -20,6 +20,9 @@ TRIES, EARLY, PATIENT = 2, 30, 100
 MORE = {EARLY: PATIENT, PATIENT: None}
 #: The trust region of a descent step shrinks by this, so often.
 SHRINK, SHRINKS = 0.1, 3
+#: Ipopt leaves sides without a multiplier at the root of its tolerance.  Those below this are taken for zero as well, where this
+#: descends clearly: gradients, too, are that inexact.
+NEARLY, CLEAR = 1e-4, 1e-4
 #: More bi-active pairs than this say little of the branch, and an LPEC over them takes long.
 SUGGESTED = 50
 #: Trust region of the LPEC that looks for any feasible branch.
@@ -108,7 +111,7 @@ class Branches:
         """Keep ``point`` and what descends from it, while the homotopy does not promise something much better."""
         while point is not None:
             self._keep(point)
-            point = self._descend(point) if final or self._gap.closed(point.f) else None
+            point = self._descend(point, final or self._gap.closed(point.f))
 
     def _keep(self, point):
         """Keep the better of the incumbent and ``point``: certified before uncertified, then the lower objective."""
@@ -116,12 +119,16 @@ class Branches:
         if best is None or (not point.certificate.certified, point.f) < (not best.certificate.certified, best.f):
             self.run.point = point
 
-    def _descend(self, point):
-        """A better point, or None."""
-        enough = point.f - PROGRESS * max(1.0, abs(point.f))
+    def _descend(self, point, worth):
+        """A better point, or None; what is not ``worth`` it is only asked whether its certificate holds."""
+        size = max(1.0, abs(point.f))
+        enough = point.f - PROGRESS * size
         if point.certificate.grade is Stationarity.DESCENT:
-            return self._step_down(point, enough)
-        return self._look_far(point, enough) if self._far_sighted and point.certificate.grade is Stationarity.B else None
+            return self._step_down(point, enough) if worth else None
+        if point.certificate.grade is not Stationarity.B:
+            return None
+        better = self._look(point, enough, NEARLY, CLEAR * size)
+        return self._look(point, enough, np.inf, 0.0) if better is None and worth and self._far_sighted else better
 
     def _step_down(self, point, enough):
         """In the branch of the certificate's direction: from its end, or within ever smaller trust regions."""
@@ -140,10 +147,13 @@ class Branches:
             better = self._certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=EARLY)
         return better if better is not None and better.f <= enough else None
 
-    def _look_far(self, point, enough):
-        """In a branch that need not touch this point: where the LPEC with every pair as a binary leads."""
-        step = self._steps.lpec(point.w, active_sets(*self._sides(point.w), np.inf), self._tolerances.radius, point.equal)
-        better = self._point(point.w + step.d, step.zero, None, False) if step.solved and step.value < 0.0 else None
+    def _look(self, point, enough, tolerance, clear):
+        """In a branch that need not touch this point: where the LPEC leads if all sides below ``tolerance`` count as zero."""
+        sets = active_sets(*self._sides(point.w), tolerance)
+        if np.count_nonzero(sets.gamma) <= point.certificate.biactive:
+            return None
+        step = self._steps.lpec(point.w, sets, self._tolerances.radius, point.equal)
+        better = self._point(point.w + step.d, step.zero, None, False) if step.solved and step.value < -clear else None
         return better if better is not None and better.f <= enough else None
 
     def _sides(self, w):
