@@ -1,10 +1,11 @@
-"""The judge of the MPCC study knows which points are B-stationary, whatever method they come from."""
+"""The judge of the MPCC study knows which points are B-stationary, whatever method they come from; its runner reads methods."""
 
 import math
 
 import pytest
 from mpcc_check import check
 from mpcc_instance import Instance
+from mpcc_worker import read_options, split_methods
 
 X, Y = [0, [0], [1]], [0, [1], [1]]
 
@@ -84,3 +85,23 @@ def test_inexact_point_is_judged_by_the_solution_it_stands_for():
 def test_inexact_point_near_a_corner_with_descent_is_no_solution():
     obj, nodes = distance_to(1, 1)
     assert check(instance(obj, [['pair', X, Y]], nodes), (1e-4, 1e-4)).b_stationary is False
+
+
+@pytest.mark.parametrize(
+    'text, methods',
+    [
+        ('hybrid,scholtes', ['hybrid', 'scholtes']),
+        ('hybrid;hybrid:relaxation=l1', ['hybrid', 'hybrid:relaxation=l1']),
+        ('hybrid:lpec=full,starts=8,product', ['hybrid:lpec=full,starts=8', 'product']),
+    ],
+)
+def test_methods_are_told_from_their_options(text, methods):
+    assert split_methods(text) == methods
+
+
+def test_options_of_a_method():
+    assert read_options('hybrid') == {}
+    assert read_options('hybrid:lpec=full,starts=8,eps_init=0.5') == {'lpec': 'full', 'starts': 8, 'eps_init': 0.5}
+    assert read_options('hybrid:nlp_solver=asl:ipopt') == {'nlp_solver': 'asl:ipopt'}
+    with pytest.raises(ValueError, match="unknown method: schotes"):
+        read_options('schotes')

@@ -2,11 +2,13 @@
 
     python docs/benchmarks/mpcc.py FOLDER [--out NAME.csv] [--limit 300] [--only a,b] [--methods hybrid,scholtes]
                                           [--largest BYTES] [--summary]
+    python docs/benchmarks/mpcc.py FOLDER --methods "hybrid;hybrid:relaxation=l1;hybrid:lpec=full,starts=8"
 
 FOLDER holds instances (``*.json``, mpcc-json) or folders of them; their reader ``mpcc_json.py`` stands in it or beside it.  The
 instances are no part of this project.  Each run (instance, method) appends a row to mpcc_FOLDER.csv beside this file, and no run
-is done twice.  At the end, or at once with --summary, the tables and the picture are made of these rows (see mpcc_summary.py).
-Each run happens in a child process, which is replaced when it dies or hangs.
+is done twice.  A method may be hybrid with options of mpec_hybrid.  At the end, or at once with --summary, the tables and the
+picture are made of these rows (see mpcc_summary.py).  Each run happens in a child process, which is replaced when it dies or
+hangs.
 """
 
 import argparse
@@ -19,7 +21,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1])]
 
 import mpcc_summary  # noqa: E402
-from mpcc_worker import COLUMNS, METHODS, serve  # noqa: E402
+from mpcc_worker import COLUMNS, METHODS, serve, split_methods  # noqa: E402
 
 #: Seconds that a child may use beyond the limit, for the model and its compilation; and for the verdict after it.
 GRACE = 300
@@ -104,7 +106,7 @@ def main():
     parser.add_argument('--out', type=Path, help="default: mpcc_FOLDER.csv beside this file")
     parser.add_argument('--limit', type=float, default=300.0, help="seconds for each run")
     parser.add_argument('--only', type=lambda text: text.split(','), help="instances, by name")
-    parser.add_argument('--methods', type=lambda text: text.split(','), default=list(METHODS))
+    parser.add_argument('--methods', type=split_methods, default=list(METHODS))
     parser.add_argument('--largest', type=float, default=float('inf'), help="leave out larger instance files (bytes)")
     parser.add_argument('--summary', action='store_true', help="run nothing")
     arguments = parser.parse_args()

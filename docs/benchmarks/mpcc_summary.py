@@ -7,6 +7,8 @@ should, instance by instance), mpcc_FOLDER.png (performance profile).
 
 import numpy as np
 import pandas as pd
+from cycler import cycler
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 
 #: Shifts of the geometric means: one second, ten Ipopt iterations.
@@ -108,11 +110,13 @@ def _wrong(row, others):
 
 def profile(table):
     """Share of instances that each method solves (B-stationary) within a factor of the fastest method."""
-    figure = Figure(figsize=(6, 4), layout='constrained')
-    axis = figure.subplots()
     known = table[table['known']]
+    methods = known['method'].unique()
+    figure = Figure(figsize=(6, 4 + 0.12 * len(methods)), layout='constrained')
+    axis = figure.subplots()
+    axis.set_prop_cycle(cycler(linestyle=['-', '--', ':']) * rcParams['axes.prop_cycle'])
     times = known['time'].where(known['solved'] & known['b_stationary'])
-    times = known.assign(time=times).pivot(index='instance', columns='method', values='time')[known['method'].unique()]
+    times = known.assign(time=times).pivot(index='instance', columns='method', values='time')[methods]
     ratios = times.div(times.min(axis=1), axis=0)
     end = 2 * ratios.max(axis=None)
     for method in ratios:
@@ -124,7 +128,7 @@ def profile(table):
     axis.set_ylim(0, 1.02)
     axis.set_xlabel('time / time of the fastest')
     axis.set_ylabel('share of instances solved, B-stationary')
-    axis.legend(loc='lower right')
+    figure.legend(loc='outside lower center', ncols=2, fontsize='small')
     axis.grid(alpha=0.3)
     return figure
 

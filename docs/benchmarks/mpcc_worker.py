@@ -1,6 +1,7 @@
 """One instance by one method, in a child process of ``mpcc.py``: the rows of its table."""
 
 import os
+import re
 import time
 from functools import lru_cache
 from pathlib import Path
@@ -43,7 +44,7 @@ def serve(pipe):
             d = _load(path)
             row |= {'n': d['n'], 'rows': len(d['con']), 'pairs': len(d['comp'])}
             row |= {'sense': 1 if d['sense'] == 'min' else -1, 'best_known': d.get('best_known')}
-            found, x = (_hybrid if method == 'hybrid' else _baseline)(path, method, limit)
+            found, x = (_baseline if method in mpcc_baselines.HOMOTOPIES else _hybrid)(path, method, limit)
             row |= found
             if x is not None:
                 row |= _measure(d, x)
@@ -126,6 +127,28 @@ def _baseline(path, method, limit):
     return row, point(answer.w)
 
 
+def split_methods(text):
+    """Methods, separated by ; or , but not where the next word is an option of the method before."""
+    return re.split(r'[;,](?!\w+=)', text)
+
+
+def read_options(method):
+    """Options of mpec_hybrid in ``hybrid:name=value,name=value``: integers, floats, words."""
+    name, _, given = method.partition(':')
+    if name != 'hybrid':
+        raise ValueError(f"unknown method: {method}")
+    return {key: _number(value) for key, value in (item.split('=') for item in given.split(',') if item)}
+
+
+def _number(text):
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            pass
+    return text
+
+
 def _hybrid(path, method, limit):
     import mpcc_json
 
@@ -133,7 +156,7 @@ def _hybrid(path, method, limit):
     m = mpcc_json.to_pyomo(d)
     started = time.perf_counter()
     options = {'time_limit': limit, 'raise_exception_on_nonoptimal_result': False, 'load_solutions': False}
-    results = SolverFactory('mpec_hybrid').solve(m, **options)
+    results = SolverFactory('mpec_hybrid').solve(m, **options, **read_options(method))
     total = time.perf_counter() - started
     info, timer = results.extra_info, results.timing_info.timer
     row = {name: _seconds(timer, name) for name in PHASES}
