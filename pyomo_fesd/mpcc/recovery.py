@@ -39,7 +39,7 @@ def _before(w0, w, homotopy):
 LADDER = (
     Recovery("back to the last relaxation, half a step", _before, lambda first, last, factor: last * factor**-0.5),
     Recovery("go on with a smaller eps", lambda w0, w, homotopy: w, lambda first, last, factor: last * factor),
-    Recovery("start again, other form", lambda w0, w, homotopy: w0, lambda first, last, factor: first * 1e-2, other_form=True),
+    Recovery("start again, other form", lambda w0, w, homotopy: w0, lambda first, last, factor: first, other_form=True),
     Recovery("restore feasibility, raise eps", lambda w0, w, homotopy: homotopy.restore(w), lambda first, last, factor: first * 10),
     Recovery("perturb the start", _perturbed, lambda first, last, factor: first * 1e-2),
     Recovery("raise eps, other form", lambda w0, w, homotopy: w0, lambda first, last, factor: first * 100, other_form=True),
