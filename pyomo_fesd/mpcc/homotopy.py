@@ -51,11 +51,13 @@ class Homotopy:
         what explores branches; None follows the path to its end
     after : callable Run -> None
         called after every relaxation and what it led to; may raise Stop
+    start : array
+        where the path begins
     """
 
-    def __init__(self, compiled, options, steps, gap, branches, after):
+    def __init__(self, compiled, options, steps, gap, branches, after, start):
         self._c, self._options, self._steps, self._gap, self._branches = compiled, options, steps, gap, branches
-        self._after, self.run = after, steps.run
+        self._after, self._start, self.run = after, start, steps.run
         self._forms = (options.relaxation,) if options.relaxation != 'auto' else AUTO[compiled.has_objective]
         self._ladder = list(LADDER)
         self.end, self.finished = None, False
@@ -65,7 +67,7 @@ class Homotopy:
 
         ``end`` is the last usable relaxation, ``finished`` whether it is that of the last eps.
         """
-        stage = _Stage(0, self._c.x0, self._options.eps_init)
+        stage = _Stage(0, self._start, self._options.eps_init)
         while stage is not None:
             self.run.eps = stage.eps
             carried = stage.duals if stage.eps <= CARRIED * ROUND_OFF else None
@@ -91,7 +93,7 @@ class Homotopy:
         self._steps.note(step.what, relaxed.w)
         self._gap.restart()
         eps = max(step.eps(options.eps_init, stage.eps, options.eps_factor), options.eps_final)
-        return _Stage((stage.form + step.other_form) % len(self._forms), step.start(self._c.x0, relaxed.w, self), eps)
+        return _Stage((stage.form + step.other_form) % len(self._forms), step.start(self._start, relaxed.w, self), eps)
 
     def _next(self, stage, relaxed):
         """Explore what the relaxation shows; the stage after it, or None."""
@@ -132,7 +134,7 @@ class Homotopy:
         self._steps.note("nothing feasible on this path, other form", relaxed.w)
         self._gap.restart()
         self._branches.forget()
-        return _Stage(stage.form + 1, self._c.x0, self._options.eps_init)
+        return _Stage(stage.form + 1, self._start, self._options.eps_init)
 
     def _certified(self):
         return self.run.point is not None and self.run.point.certificate.certified

@@ -8,11 +8,21 @@ from pyomo_fesd.mpcc.branches import Branches
 from pyomo_fesd.mpcc.gap import GapTest
 from pyomo_fesd.mpcc.homotopy import Homotopy
 from pyomo_fesd.mpcc.run import Outcome, Point, Run, Stop, Tolerances
+from pyomo_fesd.mpcc.start_points import start_point
 from pyomo_fesd.mpcc.steps import Steps
+
+#: Other starts of a problem with few pairs, before it is called infeasible.
+RESTARTS = 3
+
+
+def few_pairs(compiled):
+    """Whether a problem is so small that a thorough look costs little."""
+    return len(compiled.side_of) // 2 <= 50
+
 
 #: option ``lpec`` -> whether a full LPEC, which few pairs make cheap, looks for better branches
 FAR_SIGHTED = {
-    'auto': lambda compiled: len(compiled.side_of) // 2 <= 50,
+    'auto': few_pairs,
     'full': lambda compiled: True,
     'reduced': lambda compiled: False,
 }
@@ -43,10 +53,8 @@ class HybridSolver:
         )
         self.run = Run()
         self._steps = Steps(compiled, options, tolerances, self.run, timer, show, deadline, built)
-        gap = GapTest(options.gap_tol * 1e-2, options.gap_tol)
-        self._branches = Branches(compiled, self._steps, tolerances, gap, FAR_SIGHTED[options.lpec](compiled))
-        judge = self._branches if options.mode == 'hybrid' else None
-        self._homotopy = Homotopy(compiled, options, self._steps, gap, judge, after)
+        self._gap, self._after = GapTest(options.gap_tol * 1e-2, options.gap_tol), after
+        self._branches = Branches(compiled, self._steps, tolerances, self._gap, FAR_SIGHTED[options.lpec](compiled))
 
     def solve(self):
         """Run to a certified point or an honest end; returns the ``Run``."""
@@ -64,7 +72,7 @@ class HybridSolver:
     def _hybrid(self):
         """The whole algorithm."""
         if not (self._options.warm_start and self._from_values()):
-            self._homotopy.follow()
+            self._path(self._c.x0, self._branches).follow()
         if self.run.point is None:
             self._last_resort()
         point = self.run.point
@@ -76,17 +84,21 @@ class HybridSolver:
 
     def _relaxation_only(self):
         """The homotopy alone, for comparison: nothing is exactly complementary and nothing is certified."""
+        path = self._path(self._c.x0, None)
         try:
-            self._homotopy.follow()
+            path.follow()
         finally:
             # a limit, too, leaves the last relaxation
-            end = self._homotopy.end
+            end = path.end
             if end is not None:
                 self.run.point = Point(end, self._c.evaluate(end.w).f, self._steps.measure(end))
-        if end is not None and (self._homotopy.finished or self.run.point.certificate.feasible):
+        if end is not None and (path.finished or self.run.point.certificate.feasible):
             return Outcome.RELAXED
         self.run.point = None
         return Outcome.INFEASIBLE
+
+    def _path(self, start, branches):
+        return Homotopy(self._c, self._options, self._steps, self._gap, branches, self._after, start)
 
     def _from_values(self):
         """Whether the branch that the start values name leads to a certified point."""
@@ -95,8 +107,21 @@ class HybridSolver:
         return self.run.point is not None and self.run.point.certificate.certified
 
     def _last_resort(self):
-        """Nothing feasible on any path: the branches are searched; at the end the feasibility phase shows what contradicts."""
+        """Nothing feasible on the path: the branches are searched, where they are few also from other starts.
+
+        At the end the feasibility phase shows what contradicts.
+        """
         self._branches.search(self.run.w, self._c.x0)
+        for number in range(1, 1 + RESTARTS * few_pairs(self._c)):
+            if self.run.point is not None:
+                return
+            start = start_point(self._c, self._c.x0, self._options.seed, number)
+            self._steps.note("start elsewhere", start)
+            self._gap.restart()
+            self._branches.forget()
+            self._path(start, self._branches).follow()
+            if self.run.point is None:
+                self._branches.search(self.run.w, start)
         if self.run.point is None:
             self.run.w = self._steps.restore(self.run.w, self._options.eps_final).w
             self._branches.explore_from(self.run.w, True)

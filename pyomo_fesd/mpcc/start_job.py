@@ -27,7 +27,7 @@ from pyomo_fesd.mpcc.run import Outcome, Start
 #: Problems that a worker process keeps, each with its NLPs.
 KEPT = 2
 #: Options that belong to this process or to all starts together; with those that Pyomo gives to every solver, no run reads them.
-NOT_SENT = ('starts', 'seed', 'executor', 'callback', 'log_file', 'json_file')
+NOT_SENT = ('starts', 'executor', 'callback', 'log_file', 'json_file')
 
 #: The problems of this process, by token, if it is a worker's.
 _arrived = {}
