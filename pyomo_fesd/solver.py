@@ -223,7 +223,7 @@ def certify(model, **options):
     config = MpecHybrid.CONFIG(value=options)
     compiled = compile_problem(read_problem(model), HierarchicalTimer())
     lpec = Lpec(compiled, sort_sides(compiled), config.lpec_options.value())
-    tolerances = Tolerances(config.feasibility_tol, config.biactive_tol, config.descent_tol, config.eta_tol, config.trust_radius)
+    tolerances = Tolerances.of(config)
     certificate = certify_point(compiled, lpec, compiled.x0, tolerances)
     if certificate.lpec is None:
         return certificate

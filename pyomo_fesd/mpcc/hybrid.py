@@ -48,9 +48,7 @@ class HybridSolver:
 
     def __init__(self, compiled, options, timer, show, deadline, after, built):
         self._c, self._options = compiled, options
-        tolerances = Tolerances(
-            options.feasibility_tol, options.biactive_tol, options.descent_tol, options.eta_tol, options.trust_radius
-        )
+        tolerances = Tolerances.of(options)
         self.run = Run()
         self._steps = Steps(compiled, options, tolerances, self.run, timer, show, deadline, built)
         self._gap, self._after = GapTest(options.gap_tol * 1e-2, options.gap_tol), after

@@ -137,5 +137,5 @@ def _delivered(future, number):
         return future.result()
     except FesdError:
         raise
-    except Exception as error:
+    except Exception as error:  # each kind of executor has its own for workers that died and messages that were lost
         return failed(number, error)

@@ -38,6 +38,11 @@ class Tolerances:
     eta: float
     radius: float
 
+    @classmethod
+    def of(cls, options):
+        """Those among the options of ``mpec_hybrid``."""
+        return cls(options.feasibility_tol, options.biactive_tol, options.descent_tol, options.eta_tol, options.trust_radius)
+
 
 @dataclass(frozen=True)
 class Step:

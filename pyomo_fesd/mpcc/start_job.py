@@ -44,7 +44,7 @@ def work(job, number, x0):
             return job.solve(number, x0)
         except FesdError:
             raise
-        except Exception as error:
+        except Exception as error:  # one lost start, whatever it was, must not lose the others
             return failed(number, error)
 
 
@@ -115,7 +115,7 @@ class Job:
         """Token and pickled problem."""
         try:
             return uuid4().hex, pickle.dumps((self._compiled, self._plain))
-        except Exception as error:
+        except (pickle.PicklingError, AttributeError, TypeError) as error:  # what pickle says of functions and open files
             raise FesdError(
                 'executor',
                 f"the problem and its options cannot be sent to another process: {error}",

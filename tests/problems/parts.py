@@ -48,7 +48,7 @@ def parts(model, **options):
     config.set_value(options)
     built = Built(c)
     built.prepare(config)
-    tolerances = Tolerances(config.feasibility_tol, config.biactive_tol, config.descent_tol, config.eta_tol, config.trust_radius)
+    tolerances = Tolerances.of(config)
     steps = Steps(c, config, tolerances, run, HierarchicalTimer(), lambda step: None, Deadline(), built)
     gap = GapTest(config.gap_tol * 1e-2, config.gap_tol)
     return Parts(c, run, steps, gap, Branches(c, steps, tolerances, gap, FAR_SIGHTED[config.lpec](c)))
