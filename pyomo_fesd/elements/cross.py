@@ -9,20 +9,18 @@ Does not apply: to complementarities without time.
 import logging
 from dataclasses import dataclass
 
-import numpy as np
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
-from pyomo.core import Block, Constraint, ConstraintList, RangeSet, Set, quicksum
+from pyomo.core import Block, ConstraintList, RangeSet, Set, quicksum
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from pyomo_fesd import marks
 from pyomo_fesd.complementarity import Mixed, read
+from pyomo_fesd.elements.continuity import read_continuity
 from pyomo_fesd.errors import FesdError
-from pyomo_fesd.timeindex import DISCRETISATION, TimeIndex, derivatives, strip_time
+from pyomo_fesd.timeindex import TimeIndex, strip_time
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -62,7 +60,7 @@ class Family:
     rule : Constraint or None
         what ties the continuous side to the states, where it is a marked variable
     jumps_with_controls : bool
-        the switching function contains a control that is held on each stage: no continuity from one stage to the next
+        the continuous side contains a control that is held on each stage: no continuity from one stage to the next
     """
 
     name: str
@@ -86,13 +84,15 @@ class Family:
         return [self.sides[t][side] for t in labels]
 
 
-def read_families(block, wrt, controls):
+def read_families(block, wrt, controls, told=()):
     """The complementarities over ``wrt`` on ``block``, by family.
 
     Parameters
     ----------
     controls : list of Var
         held constant on each stage
+    told : list of Var
+        variables of which the user says that they are continuous in time
 
     Raises
     ------
@@ -100,13 +100,9 @@ def read_families(block, wrt, controls):
         for conditions with two bounds on one side (mixed complementarity) over time
     """
     times = TimeIndex(wrt)
-    rules = ComponentMap(marks.marked(block.model(), marks.CONTINUOUS))
-    continuous = ComponentSet(rules)
-    continuous.update(d.get_state_var() for d in derivatives(block.model(), wrt))
-    held = ComponentSet(controls)
     datas = list(block.component_data_objects(Complementarity, active=True, descend_into=Block))
-    if not all(map(marks.is_generated, datas)):
-        continuous.update(_defined_by_states(block.model(), times, wrt, continuous))
+    written = not all(map(marks.is_generated, datas))
+    continuity = read_continuity(block.model(), times, ComponentSet(controls), told, trace=written)
     families = []
     for name, conditions in times.families(datas).items():
         sides = {t: read(c) for t, c in conditions.items()}
@@ -118,66 +114,20 @@ def read_families(block, wrt, controls):
                 "write it as two conditions: l <= x perp F+ and x <= u perp F-, with F = F+ - F-",
             )
         inner = next((t for t in wrt if t in sides and t != wrt.first()), None)
-        smooth = tuple(_is_continuous(s, continuous) for s in sides[inner]) if inner is not None else (False, False)
+        smooth = tuple(map(continuity.holds, sides[inner])) if inner is not None else (False, False)
         if inner is not None and not any(smooth):
             logger.warning(
                 "%s: neither side is known to be continuous in time, so a switch inside an element may go unnoticed. Write one "
-                "side by differential states, or by a variable that one equation ties to them.",
+                "side by differential states, or by variables that equations tie to them; or name its variables with the keyword "
+                "continuous.",
                 _public_name(name),
             )
         if smooth == (True, False):
             sides, smooth = {t: (H, G) for t, (G, H) in sides.items()}, (False, True)
-        rule = _rule(sides[inner][1], rules) if smooth[1] else None
-        families.append(Family(_public_name(name), conditions, sides, smooth, rule, _contains(rule, held)))
+        lam = sides[inner][1] if smooth[1] else None
+        rule, jumps = (continuity.rule(lam), continuity.jumps_at_stages(lam)) if smooth[1] else (None, False)
+        families.append(Family(_public_name(name), conditions, sides, smooth, rule, jumps))
     return families
-
-
-def _defined_by_states(model, times, wrt, continuous):
-    """Algebraic variables at one inner time that equations tie to continuous ones: such a variable is continuous itself.
-
-    They are the unknowns of the equations that are not under-determined (Dulmage and Mendelsohn): those that no alternating path
-    connects with an unmatched unknown.
-    """
-    t = list(wrt)[1]
-
-    def unknown(v):
-        return times.time(v) is not None and v not in continuous and v.parent_component() not in continuous
-
-    rows = [
-        [v for v in identify_variables(c.body) if unknown(v)]
-        for c in model.component_data_objects(Constraint, active=True, descend_into=Block)
-        if c.equality and times.time(c) == t and not c.parent_component().local_name.endswith(DISCRETISATION)
-    ]
-    columns = ComponentMap()
-    for row in rows:
-        for v in row:
-            columns.setdefault(v, len(columns))
-    places = [(i, columns[v]) for i, row in enumerate(rows) for v in row]
-    if not places:
-        return ComponentSet()
-    incidence = csr_matrix((np.ones(len(places)), tuple(zip(*places))), shape=(len(rows), len(columns)))
-    row_of = maximum_bipartite_matching(incidence, perm_type='row')  # of each column, -1 if unmatched
-    column_of = {i: j for j, i in enumerate(row_of) if i >= 0}
-    by_column, loose = incidence.tocsc(), {j for j, i in enumerate(row_of) if i < 0}
-    waiting = list(loose)
-    while waiting:
-        j = waiting.pop()
-        for i in by_column.indices[by_column.indptr[j] : by_column.indptr[j + 1]]:
-            if column_of[i] not in loose:
-                loose.add(column_of[i])
-                waiting.append(column_of[i])
-    return ComponentSet(v for v, j in columns.items() if j not in loose)
-
-
-def _rule(side, rules):
-    """The Constraint that ties a marked variable to the states."""
-    return rules.get(side.parent_component()) if side.is_variable_type() else None
-
-
-def _contains(rule, components):
-    """Whether a Constraint over time contains variables of ``components``."""
-    data = next(iter(rule.values()), None) if rule is not None else None
-    return data is not None and any(v.parent_component() in components for v in identify_variables(data.body))
 
 
 def warn_gauss_on_curved_surfaces(families):
@@ -198,11 +148,6 @@ def _public_name(name):
     """A family's name as shown in reports: without time and without the package's own blocks."""
     name = strip_time(name)
     return '.'.join(part for part in name.split('.') if not part.startswith(marks.GENERATED))
-
-
-def _is_continuous(expr, continuous):
-    variables = list(identify_variables(expr, include_fixed=True)) if hasattr(expr, 'is_expression_type') else []
-    return bool(variables) and all(v in continuous or v.parent_component() in continuous for v in variables)
 
 
 def add_cross_complementarity(block, families, grid, wrt, form):

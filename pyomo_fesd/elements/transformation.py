@@ -111,6 +111,14 @@ class FiniteElements(Transformation):
         ConfigValue(default=[], domain=_components, description="controls (Vars over time) held constant on each stage"),
     )
     CONFIG.declare(
+        'continuous',
+        ConfigValue(
+            default=[],
+            domain=_components,
+            description="algebraic Vars over time that are continuous although no equation says so; states need not be named",
+        ),
+    )
+    CONFIG.declare(
         'stages',
         ConfigValue(
             default=None,
@@ -128,7 +136,7 @@ class FiniteElements(Transformation):
             stages = self._discretise(instance, wrt, config)
             grid = read_grid(wrt, stages)
             check_orders(instance.model(), wrt)
-            families = read_families(instance, wrt, config.piecewise_constant)
+            families = read_families(instance, wrt, config.piecewise_constant, config.continuous)
             waiting = next(_active_disjunctions(instance, wrt), None)
             if waiting is not None and not families:
                 raise FesdError(
