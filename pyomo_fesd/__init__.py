@@ -11,7 +11,8 @@ from pyomo_fesd.errors import FesdError
 from pyomo_fesd.plot import plot
 from pyomo_fesd.report import report
 from pyomo_fesd.solver import certify
+from pyomo_fesd.state_jump import state_jump
 from pyomo_fesd.trajectory import element_lengths, physical_time, switches, trajectory
 
 __version__ = '0.1.0'
-__all__ = ['FesdError', 'certify', 'element_lengths', 'physical_time', 'plot', 'report', 'switches', 'trajectory']
+__all__ = ['FesdError', 'certify', 'element_lengths', 'physical_time', 'plot', 'report', 'state_jump', 'switches', 'trajectory']

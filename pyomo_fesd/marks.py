@@ -6,10 +6,14 @@ A mark is a ``Suffix(direction=LOCAL)`` with one of the names below on the block
 =================  ========================  ===========================================================================
 mark               on                        value
 =================  ========================  ===========================================================================
-CONTINUOUS         Var                       the Constraint (of lam, mu, p, n) or Complementarity (of a kink's s) that ties it to the
-                                             states: continuous in time where the quantity that switches is
+CONTINUOUS         Var                       the Constraint (of lam, mu, p, n) or Complementarity (of a kink's s) that ties it to
+                                             the states: continuous in time where the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
+MEMORY             Expression (data)         the conditions c >= 0 of a mode with memory; the Expression is its weight, 1 or 0 in an
+                                             element; the mode goes on until a condition ends
+GUARD              Expression (data)         ``True``: a jump of the state happens where this falls to 0 from above
+RESET              Var (data)                the Expression of the value after the jump whose guard stands on the same block
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
 ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
                                              certificate looks beyond them
@@ -22,6 +26,9 @@ from pyomo.core import Block, Suffix
 CONTINUOUS = 'fesd_continuous'
 SELECTOR = 'fesd_selector'
 INDICATOR = 'fesd_indicator'
+MEMORY = 'fesd_memory'
+GUARD = 'fesd_guard'
+RESET = 'fesd_reset'
 DECIDED = 'fesd_decided'
 ARTIFICIAL = 'fesd_artificial'
 PENALTY = 'fesd_penalty'

@@ -86,6 +86,28 @@ def read_regions(disjunction, disjuncts, inequalities, cache):
     return Regions(functions, cache[key])
 
 
+def refuse_gaps(disjunction, disjuncts, stated):
+    """For modes with memory: regions may overlap, but some mode must be possible everywhere.
+
+    Parameters
+    ----------
+    stated : list of lists of expressions
+        the conditions c >= 0 of each disjunct
+    """
+    for disjunct, cs in zip(disjuncts, stated):
+        if not cs:
+            raise FesdError(
+                disjunct,
+                f"this mode of Disjunction '{disjunction.name}' has no region condition: it would never end",
+                "add the inequality on the states up to which the mode goes on",
+            )
+    functions, values, S = _sign_matrix(disjunction, disjuncts, stated)
+    possible = _possibility(_relations(values), len(functions))
+    for pattern in itertools.product((1, -1), repeat=len(functions)):
+        if not _owners(S, pattern) and possible(pattern):
+            raise _not_a_partition(disjunction, disjuncts, functions, pattern, [], "let the regions cover the state space")
+
+
 def _sign_matrix(disjunction, disjuncts, stated):
     """Collect the distinct switching functions; S[i, k] = +-1 where mode i needs that sign of c_k, 0 where it does not say."""
     sampled = _sample(disjunction, [c for cs in stated for c in cs])
@@ -173,25 +195,37 @@ def _patterns(disjunction, disjuncts, functions, relations, S):
     owned = [[] for _ in disjuncts]
     possible = _possibility(relations, len(functions))
     for pattern in itertools.product((1, -1), repeat=len(functions)):
-        owners = [i for i, row in enumerate(S) if all(s in (0, p) for s, p in zip(row, pattern))]
+        owners = _owners(S, pattern)
         if len(owners) == 1:
             if possible(pattern):
                 owned[owners[0]].append(pattern)
         elif possible(pattern):
-            where = ' and '.join(f"{c} {'>=' if p > 0 else '<='} 0" for c, p in zip(functions, pattern))
-            names = ', '.join(disjuncts[i].name for i in owners) or 'no disjunct'
-            raise FesdError(
-                disjunction,
-                f"the regions {'overlap' if owners else 'leave a gap'}: where {where}, {names} "
-                f"{'are active at once' if owners else 'is active'}",
-                "make the inequalities of the disjuncts a partition of the state space",
-            )
+            fix = "make the inequalities of the disjuncts a partition of the state space"
+            if owners:
+                fix += "; for hysteresis, where the last mode decides, name the Disjunction in the keyword memory of fesd.dcs"
+            raise _not_a_partition(disjunction, disjuncts, functions, pattern, owners, fix)
     for disjunct, patterns in zip(disjuncts, owned):
         if not patterns:
             raise FesdError(
                 disjunct, "the region is empty: no point satisfies its inequalities", "correct the inequalities of this disjunct"
             )
     return owned
+
+
+def _owners(S, pattern):
+    """The modes to whose regions a sign pattern belongs."""
+    return [i for i, row in enumerate(S) if all(s in (0, p) for s, p in zip(row, pattern))]
+
+
+def _not_a_partition(disjunction, disjuncts, functions, pattern, owners, fix):
+    where = ' and '.join(f"{c} {'>=' if p > 0 else '<='} 0" for c, p in zip(functions, pattern))
+    names = ', '.join(disjuncts[i].name for i in owners) or 'no disjunct'
+    return FesdError(
+        disjunction,
+        f"the regions {'overlap' if owners else 'leave a gap'}: where {where}, {names} "
+        f"{'are active at once' if owners else 'is active'}",
+        fix,
+    )
 
 
 def _relations(values):

@@ -72,13 +72,24 @@ class Reader:
 
     def read(self, disjunction):
         """Read one DisjunctionData into a ``System``; the model is not changed."""
+        modes = self.modes(disjunction)
+        if len(modes) == 1:
+            return System(disjunction, modes, None, None)
+        equations, inequalities = self.contents(disjunction, modes)
+        patterns = self._patterns.setdefault(self._times.split(disjunction)[1], {})
+        regions = read_regions(disjunction, modes, inequalities, patterns)
+        _refuse_defined_in_regions(disjunction, regions.functions, equations)
+        return System(disjunction, modes, regions, equations)
+
+    def modes(self, disjunction, fixed_are_left_out=True):
+        """The disjuncts that can be active; a fixed indicator decides unless it says only which mode comes first."""
         if not disjunction.xor:
             raise FesdError(
                 disjunction,
                 "it is declared with xor=False: several modes may be active at once",
                 "a switching system is in one mode at a time: leave xor at True",
             )
-        modes = [d for d in disjunction.disjuncts if self._possible(disjunction, d)]
+        modes = [d for d in disjunction.disjuncts if self._possible(disjunction, d, fixed_are_left_out)]
         chosen = [d for d in modes if d.indicator_var.fixed and d.indicator_var.value]
         if len(chosen) > 1:
             raise FesdError(
@@ -86,30 +97,31 @@ class Reader:
                 "two modes are fixed to True: " + ', '.join(f"'{d.name}'" for d in chosen),
                 "a switching system is in one mode at a time: fix one indicator only",
             )
-        modes = chosen or modes
+        if fixed_are_left_out:
+            modes = chosen or modes
         if not modes:
             raise FesdError(disjunction, "all its disjuncts are switched off", "activate one, or deactivate the Disjunction")
         for disjunct in modes:
             self._refuse_contents(disjunct)
-        if len(modes) == 1:
-            return System(disjunction, modes, None, None)
+        return modes
+
+    def contents(self, disjunction, modes):
+        """What two or more modes define (``ModeEquations``), and the inequalities of each."""
         split = [_constraints(d) for d in modes]
         for disjunct, (equalities, inequalities) in zip(modes, split):
             mentioned = (v for c in (*equalities, *inequalities) for v in identify_variables(c.body))
             refuse_foreign(mentioned, disjunction.model(), disjunct)
         self._refuse_derivatives_in_regions(split)
-        _, family = self._times.split(disjunction)
-        choice, patterns = self._choices.setdefault(family, {}), self._patterns.setdefault(family, {})
+        choice = self._choices.setdefault(self._times.split(disjunction)[1], {})
         equalities, inequalities = ([part[k] for part in split] for k in (0, 1))
         equations = read_equations(disjunction, modes, equalities, self.is_derivative, self.is_state, choice)
-        regions = read_regions(disjunction, modes, inequalities, patterns)
-        _refuse_defined_in_regions(disjunction, regions, equations)
-        return System(disjunction, modes, regions, equations)
+        return equations, inequalities
 
     @staticmethod
-    def _possible(disjunction, disjunct):
+    def _possible(disjunction, disjunct, fixed_are_left_out):
         if disjunct.active:
-            return not (disjunct.indicator_var.fixed and disjunct.indicator_var.value is False)
+            off = disjunct.indicator_var.fixed and disjunct.indicator_var.value is False
+            return not (off and fixed_are_left_out)
         if disjunct.transformation_block is not None:
             raise FesdError(
                 disjunct,
@@ -141,9 +153,9 @@ class Reader:
                         )
 
 
-def _refuse_defined_in_regions(disjunction, regions, equations):
+def _refuse_defined_in_regions(disjunction, functions, equations):
     defined = ComponentSet(equations.defined)
-    for c in regions.functions:
+    for c in functions:
         for v in identify_variables(c, include_fixed=True):
             if v in defined:
                 raise FesdError(

@@ -13,7 +13,7 @@ from pyomo.core.util import target_list
 from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import marks, records
-from pyomo_fesd.dcs import stewart, two_mode
+from pyomo_fesd.dcs import memory, stewart, two_mode
 from pyomo_fesd.dcs.system import Reader, refuse_logic_over_time
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
@@ -60,6 +60,15 @@ class DynamicComplementaritySystem(Transformation):
             description="'two_mode' (eq. 5), 'stewart' (eq. 3), or 'auto': the smallest that fits",
         ),
     )
+    CONFIG.declare(
+        'memory',
+        ConfigValue(
+            default=[],
+            domain=target_list,
+            description="Disjunctions (or Blocks with Disjunctions) with hysteresis: where regions overlap the last mode goes on; "
+            "the mode at the first time is told by fixing its indicator there",
+        ),
+    )
 
     def _apply_to(self, instance, **kwds):
         config = self.CONFIG(kwds.pop('options', {}))
@@ -71,16 +80,20 @@ class DynamicComplementaritySystem(Transformation):
             refuse_logic_over_time(block, times.time)
         reader = Reader(derivatives(instance.model(), wrt), times)
         with PauseGC():
-            systems = [reader.read(d) for d in found]
+            remembered = ComponentSet(_disjunctions(instance, config.memory)) if config.memory else ()
+            systems = [memory.read(reader, d) if d in remembered else reader.read(d) for d in found]
             forms = [self._form(config.form, system) for system in systems]
             for system, form in zip(systems, forms):
                 _add(system, form)
-        records.repeat_after_expansion(instance, 'fesd.dcs', wrt, targets=config.targets, form=config.form)
+        keywords = {'targets': config.targets, 'form': config.form, 'memory': config.memory}
+        records.repeat_after_expansion(instance, 'fesd.dcs', wrt, **keywords)
 
     @staticmethod
     def _form(wanted, system):
         if len(system.modes) == 1:
             return None
+        if memory.applies(system):
+            return memory
         for name, form in FORMS.items():
             if wanted in ('auto', name) and form.applies(system):
                 return form
@@ -272,6 +285,8 @@ def _map_form(block, index, system, form):
     maps = block.private_data('pyomo_fesd.dcs')
     for con in form.equations(block, index):
         maps.disjunction[con] = system.disjunction
+    if form is memory:
+        return  # its conditions belong to the elements, not to points in time
     owners = [d for d, patterns in zip(system.modes, system.regions.patterns) for _ in patterns]
     for i, disjunct in enumerate(owners, start=1):
         condition = block.complementarity[(*index, i)]

@@ -18,7 +18,9 @@ from pyomo_fesd.elements.equilibration import MODES, add_equilibration
 from pyomo_fesd.elements.expansion import discretise
 from pyomo_fesd.elements.explicit_time import warn_explicit_time
 from pyomo_fesd.elements.grid import check_resolution, read_grid
+from pyomo_fesd.elements.jumps import add_jumps, read_jumps, refuse_jumping_switches
 from pyomo_fesd.elements.lengths import add_lengths, check_orders, multiply_derivatives
+from pyomo_fesd.elements.memory import add_memory, read_modes
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
 from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.errors import FesdError
@@ -137,8 +139,10 @@ class FiniteElements(Transformation):
             grid = read_grid(wrt, stages)
             check_orders(instance.model(), wrt)
             families = read_families(instance, wrt, config.piecewise_constant, config.continuous)
+            modes, jumps = read_modes(instance.model(), wrt), read_jumps(instance.model(), wrt)
+            refuse_jumping_switches(families, jumps)
             waiting = next(_active_disjunctions(instance, wrt), None)
-            if waiting is not None and not families:
+            if waiting is not None and not (families or modes or jumps):
                 raise FesdError(
                     waiting, "an active Disjunction over time", "apply fesd.dcs first: its complementarity finds the switches"
                 )
@@ -153,9 +157,11 @@ class FiniteElements(Transformation):
                 rebuild(integral, rule, block, grid)
             hold_controls(block, config.piecewise_constant, grid, wrt)
             multiply_derivatives(instance.model(), wrt, block, grid)
+            add_jumps(block, jumps, grid, wrt)
+            add_memory(block, modes, grid, wrt)
             add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
-            if families:
-                add_equilibration(block, families, grid, config.equilibration, config.rho)
+            if families or modes or jumps:
+                add_equilibration(block, families, modes, grid, config.equilibration, config.rho)
             else:
                 block.r.fix(1)
 

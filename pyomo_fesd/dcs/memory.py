@@ -1,0 +1,118 @@
+"""Modes with memory (hysteresis): a mode goes on until its own region ends, also where the region of another one has begun.
+
+    nu_i in {0, 1} constant between switches,  sum_i nu_i = 1
+    nu_i = 1  only where c_ik(x) >= 0 for all k           (the region of mode i, its inequalities)
+    nu_i falls from 1 to 0 only where some c_ik(x) = 0     (the region ends)
+
+The regions of the modes overlap; in the overlap the last mode decides.  With two modes that share no boundary this is a relay
+with hysteresis, and the state never slides between its modes.
+
+Takes: a ``MemorySystem``.
+Leaves: ``nu`` (two modes: one, as in eq. 5), ``weight`` of every mode and ``condition`` as Expressions, ``simplex`` for more
+than two modes, ``mode`` (eq. 7), and the mark MEMORY, from which ``fesd.finite_elements`` makes the law of switching between its
+elements (``elements/memory.py``).
+Does not apply: to a model on a fixed grid, where no element boundary can lie on the end of a region.
+"""
+
+from dataclasses import dataclass
+
+from pyomo.core import Constraint, Expression, Set, Var
+
+from pyomo_fesd import marks
+from pyomo_fesd.dcs.modes import ModeEquations
+from pyomo_fesd.dcs.regions import conditions, refuse_gaps
+
+NAME = 'memory'
+
+
+@dataclass(frozen=True)
+class MemorySystem:
+    """One Disjunction with memory at one time.
+
+    Attributes
+    ----------
+    disjunction : DisjunctionData
+    modes : list of DisjunctData
+    conditions : list of lists of expressions
+        for each mode the c_ik of its region c_ik >= 0
+    equations : ModeEquations
+    """
+
+    disjunction: object
+    modes: list
+    conditions: list
+    equations: ModeEquations
+
+
+def read(reader, disjunction):
+    """Read one DisjunctionData whose last mode decides where regions overlap.
+
+    Raises
+    ------
+    FesdError
+        for what every Disjunction is refused for, but not for overlaps
+    """
+    modes = reader.modes(disjunction, fixed_are_left_out=False)
+    if len(modes) == 1:
+        return reader.read(disjunction)
+    equations, inequalities = reader.contents(disjunction, modes)
+    stated = [[c for con in cons for c in conditions(con)] for cons in inequalities]
+    refuse_gaps(disjunction, modes, stated)
+    return MemorySystem(disjunction, modes, stated, equations)
+
+
+def applies(system):
+    """Systems that were read as such."""
+    return isinstance(system, MemorySystem)
+
+
+def size(system):
+    """Number of modes."""
+    return len(system.modes)
+
+
+def declare(block, index, modes):
+    """Declare the components of the form over ``index`` (a tuple of sets) for a number of ``modes``."""
+    block.modes = Set(dimen=1, initialize=range(1, modes + 1))
+    block.conditions = Set(dimen=1)
+    block.nu = Var(*index, Set(dimen=1, initialize=[1] if modes == 2 else list(block.modes)), dense=False, bounds=(0, 1))
+    block.weight = Expression(*index, block.modes)
+    block.condition = Expression(*index, block.modes, block.conditions)
+    if modes > 2:
+        block.simplex = Constraint(*index)
+
+
+def add(block, index, system):
+    """Add one time of one Disjunction; returns the weight of each mode."""
+    nu = [block.nu[(*index, i)] for i in ([1] if len(system.modes) == 2 else block.modes)]
+    weights = [nu[0], 1 - nu[0]] if len(system.modes) == 2 else nu
+    for i, (weight, stated) in enumerate(zip(weights, system.conditions), start=1):
+        block.weight[(*index, i)] = weight
+        for k, c in enumerate(stated, start=1):
+            block.conditions.add(k)
+            block.condition[(*index, i, k)] = c
+        kept = tuple(block.condition[(*index, i, k)] for k in range(1, len(stated) + 1))
+        marks.mark(block, marks.MEMORY, block.weight[(*index, i)], kept)
+    _take_given(system.modes, nu)
+    if len(nu) > 1:
+        block.simplex.add(index or None, sum(nu) == 1)
+    # all but one are independent: the last follows from the simplex
+    for variable in nu[1:] or nu:
+        marks.mark(block, marks.SELECTOR, variable)
+    return weights
+
+
+def _take_given(modes, nu):
+    """Initial values of nu; an indicator that the user fixed, as that of the mode at the first time, fixes it."""
+    for variable in nu:
+        variable.value = 1 / len(modes)
+    for i, disjunct in enumerate(modes):
+        if disjunct.indicator_var.fixed:
+            on = float(disjunct.indicator_var.value)
+            variable, given = (nu[i], on) if i < len(nu) else (nu[0], 1 - on)
+            variable.fix(given)
+
+
+def equations(block, index):
+    """The equations of one time."""
+    return [block.simplex[index or None]] if block.component('simplex') is not None else []

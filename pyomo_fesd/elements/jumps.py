@@ -1,0 +1,141 @@
+"""State jumps at element boundaries: x(t+) = J(x(t-)) where a guard falls to zero.
+
+At every inner boundary b, with the guard g and the states x_j that it resets:
+
+    0 <= e_b  perp  g(x_b) >= 0,     0 <= e_b  perp  1 - e_b >= 0            (a jump, e = 1, only where g = 0)
+    after_{b,j} = x_{b,j} + sum over jumps of e_b (J_j(x_b) - x_{b,j})
+
+The element right of the boundary starts from ``after`` in place of x; the guard never becomes negative, so a trajectory that
+arrives at g = 0 and would go on jumps there.
+
+Takes: the marks GUARD and RESET (``pyomo_fesd.state_jump``).
+Leaves: ``jumps`` (a block): ``e``, ``after``, ``reset``, ``guarded``, ``complementarity``; discretisation equations that start
+from ``after``.
+Does not apply: at the first and the last time.
+"""
+
+from dataclasses import dataclass
+
+from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.core import Block, Constraint, ConstraintList, Set, Var, quicksum
+from pyomo.core.expr.visitor import identify_variables, replace_expressions
+from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd import marks
+from pyomo_fesd.errors import FesdError
+from pyomo_fesd.timeindex import DISCRETISATION, TimeIndex, derivatives, strip_time
+
+
+@dataclass(frozen=True)
+class Jump:
+    """One law of reset over time.
+
+    Attributes
+    ----------
+    name : str
+    guards : dict label -> expression
+    resets : dict label -> list of (VarData, expression)
+        states with their values after the jump
+    """
+
+    name: str
+    guards: dict
+    resets: dict
+
+
+def read_jumps(model, wrt):
+    """The laws of reset of a model, from the marks.
+
+    Raises
+    ------
+    FesdError
+        if something is reset that is no differential state with respect to ``wrt``
+    """
+    times, found = TimeIndex(wrt), {}
+    states = ComponentSet(d.get_state_var() for d in derivatives(model, wrt))
+    for guard, _ in marks.marked(model, marks.GUARD):
+        home = guard.parent_block()
+        label, name = times.split(home)
+        resets = [(x, after.expr) for x, after in marks.marked(home, marks.RESET)]
+        for x, _ in resets:
+            if x.parent_component() not in states or times.time(x) != label:
+                raise FesdError(
+                    home,
+                    f"'{x.name}' is reset, but it is no differential state at this time",
+                    "reset variables that have a DerivativeVar; algebraic variables follow from their equations",
+                )
+        jump = found.setdefault(strip_time(name), Jump(strip_time(name), {}, {}))
+        jump.guards[label], jump.resets[label] = guard.expr, resets
+    return list(found.values())
+
+
+def refuse_jumping_switches(families, jumps):
+    """A switching function of a state that jumps has two values at a boundary; not supported."""
+    jumping = ComponentSet(x.parent_component() for j in jumps for resets in j.resets.values() for x, _ in resets)
+    for family in families:
+        if not (jumping and family.continuous[1]):
+            continue
+        expressions = [family.sides[t][1] for t in list(family.sides)[:1]]
+        expressions += [c.body for c in list(family.rule.values())[:1]] if family.rule is not None else []
+        for v in (v for e in expressions for v in identify_variables(e, include_fixed=True)):
+            if v.parent_component() in jumping:
+                raise FesdError(
+                    family.name,
+                    f"it switches on '{v.parent_component().name}', which jumps",
+                    "let the switching function be one of states that do not jump",
+                )
+
+
+def add_jumps(block, jumps, grid, wrt):
+    """Put the jumps at the inner boundaries of ``grid`` on ``block``, and let elements start after them."""
+    if not jumps:
+        return
+    block.jumps = home = Block()
+    home.law = Set(initialize=[j.name for j in jumps], ordered=True)
+    home.boundary = Set(initialize=range(1, len(grid.elements)), ordered=True)
+    home.e = Var(home.law, home.boundary, bounds=(0, 1), initialize=0)
+    home.complementarity = Complementarity(home.law, home.boundary, [1, 2])
+    home.guarded = ConstraintList()
+    for jump in jumps:
+        for element in grid.elements[:-1]:
+            e = home.e[jump.name, element.n]
+            home.complementarity.add((jump.name, element.n, 1), complements(e >= 0, jump.guards[element.right] >= 0))
+            home.complementarity.add((jump.name, element.n, 2), complements(e >= 0, 1 - e >= 0))
+        # the pairs keep the guard's sign at the inner boundaries
+        paired = {element.right for element in grid.elements[:-1]}
+        for label in jump.guards.keys() - paired:
+            home.guarded.add(jump.guards[label] >= 0)
+    _add_values_after(home, jumps, grid, wrt)
+
+
+def _add_values_after(home, jumps, grid, wrt):
+    """One value after the boundary for each state that jumps there, whatever the number of laws."""
+    times = TimeIndex(wrt)
+    home.number = Set(dimen=1)
+    home.after = Var(home.boundary, home.number, dense=False)
+    home.reset = Constraint(home.boundary, home.number)
+    starts = {}
+    for element in grid.elements[:-1]:
+        contributions = ComponentMap()
+        for jump in jumps:
+            for x, J in jump.resets.get(element.right, ()):
+                contributions.setdefault(x, []).append(home.e[jump.name, element.n] * (J - x))
+        for j, (x, terms) in enumerate(contributions.items(), start=1):
+            home.number.add(j)
+            after = home.after[element.n, j]
+            after.value = x.value
+            home.reset.add((element.n, j), after == x + quicksum(terms))
+            starts.setdefault(element.n + 1, {})[id(x)] = after
+    owner = grid.element_of()
+    for equation in home.model().component_data_objects(Constraint, active=True, descend_into=Block):
+        if equation.parent_component().local_name.endswith(DISCRETISATION):
+            label = times.time(equation)
+            start = starts.get(owner[label].n) if label in owner else None
+            if start is not None:
+                equation.set_value(replace_expressions(equation.expr, start))
+
+
+def unchanged(block, before):
+    """Factors of eta (eq. 12) at the boundary after element ``before``: 0 where a state jumps."""
+    home = block.component('jumps')
+    return [] if home is None else [1 - home.e[law, before.n] for law in home.law]

@@ -1,0 +1,125 @@
+"""Hysteresis between elements: a mode goes on over element boundaries until a condition of its region ends.
+
+With the weight nu_{n,i} of mode i in element n, constant in the element, and c_ik = p - n at the boundaries b = 0..N:
+
+    nu_{n,i} in {0, 1}:    0 <= nu_{n,i}  perp  1 - nu_{n,i} >= 0
+    region:                0 <= n_{b,ik}  perp  nu_{b,i} + nu_{b+1,i} >= 0     (the elements on either side)
+    the region's end:      0 <= p_{b,ik}  perp  n_{b,ik} + d_{b,ik} >= 0,      nu_{b,i} - nu_{b+1,i} <= sum_k d_{b,ik}
+
+so a mode is left (d > 0) only where one of its c_ik is 0, and it cannot go on beyond.  There is no multiplier between 0 and 1:
+modes with memory do not slide.
+
+Takes: the marks MEMORY.
+Leaves: ``memory`` (a block): ``p``, ``n``, ``d``, ``switching``, ``leave``, ``complementarity``, ``hold``.
+Does not apply: to a condition that ends and begins again inside one element; more elements find it.
+"""
+
+from dataclasses import dataclass
+
+from pyomo.core import Block, Constraint, Set, Var, quicksum, value
+from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd import marks
+from pyomo_fesd.timeindex import TimeIndex
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode with memory over time.
+
+    Attributes
+    ----------
+    name : str
+    weights : dict label -> expression
+    conditions : dict label -> tuple of expressions c >= 0
+    independent : bool
+        whether its weight is a variable of its own; the last one follows from the others
+    """
+
+    name: str
+    weights: dict
+    conditions: dict
+    independent: bool
+
+    def weight(self, element):
+        """nu_{n,i}: the value at the last stage of the element stands for all of it."""
+        return self.weights[element.points[-1]]
+
+    def unchanged(self, before, after):
+        """Factor of eta (eq. 12) between two elements: 1 where the mode goes on or stays off."""
+        a, b = self.weight(before), self.weight(after)
+        return a * b + (1 - a) * (1 - b)
+
+
+def read_modes(model, wrt):
+    """The modes with memory of a model, from the marks."""
+    times, marked = TimeIndex(wrt), dict()
+    selectors = {id(v) for v, _ in marks.marked(model, marks.SELECTOR)}
+    for weight, conditions in marks.marked(model, marks.MEMORY):
+        label, name = times.split(weight)
+        marked.setdefault(name, {})[label] = (weight.expr, conditions)
+    return [
+        Mode(
+            name,
+            {t: weight for t, (weight, _) in family.items()},
+            {t: tuple(c.expr for c in conditions) for t, (_, conditions) in family.items()},
+            all(id(weight) in selectors for weight, _ in family.values()),
+        )
+        for name, family in marked.items()
+    ]
+
+
+def add_memory(block, modes, grid, wrt):
+    """Put the law of switching between the elements of ``grid`` on ``block``; the marks are used up."""
+    if not modes:
+        return
+    most = max(len(cs) for mode in modes for cs in mode.conditions.values())
+    block.memory = memory = Block()
+    memory.mode = Set(initialize=[m.name for m in modes], ordered=True)
+    memory.boundary = Set(initialize=range(len(grid.elements) + 1), ordered=True)
+    memory.number = Set(initialize=range(1, most + 1), ordered=True)
+    index = (memory.mode, memory.boundary, memory.number)
+    for name in 'pn':
+        memory.add_component(name, Var(*index, dense=False, bounds=(0, None)))
+    memory.d = Var(*index, dense=False, bounds=(0, 1))
+    memory.switching = Constraint(*index)
+    memory.leave = Constraint(memory.mode, memory.boundary)
+    memory.complementarity = Complementarity(memory.mode, memory.boundary, Set(initialize=range(2 * most + 1), ordered=True))
+    memory.hold = Constraint(memory.mode, wrt)
+    for mode in modes:
+        _add_boundaries(memory, mode, grid, wrt)
+        if mode.independent:
+            _add_elements(memory, mode, grid, wrt)
+
+
+def _add_boundaries(memory, mode, grid, wrt):
+    labels = [wrt.first(), *(e.right for e in grid.elements)]
+    weights = [None, *map(mode.weight, grid.elements), None]
+    for b, label in enumerate(labels):
+        before, after = weights[b], weights[b + 1]
+        sides = [w for w in (before, after) if w is not None]
+        inner, left = len(sides) == 2, []
+        for k, c in enumerate(mode.conditions[label], start=1):
+            p, n = memory.p[mode.name, b, k], memory.n[mode.name, b, k]
+            now = value(c, exception=False) or 0.0
+            p.value, n.value = max(now, 0.0), max(-now, 0.0)
+            memory.switching.add((mode.name, b, k), c == p - n)
+            if inner:
+                left.append(memory.d[mode.name, b, k])
+                left[-1].value = 0.0
+            memory.complementarity.add((mode.name, b, 2 * k - 1), complements(n >= 0, quicksum(sides) >= 0))
+            memory.complementarity.add((mode.name, b, 2 * k), complements(p >= 0, quicksum([n, *left[-1:]]) >= 0))
+        if inner:
+            memory.leave.add((mode.name, b), before - after <= quicksum(left))
+
+
+def _add_elements(memory, mode, grid, wrt):
+    """nu is 0 or 1, and the same at all points of an element; the first time belongs to the first element."""
+    for element in grid.elements:
+        nu = mode.weight(element)
+        memory.complementarity.add((mode.name, element.n, 0), complements(nu >= 0, 1 - nu >= 0))
+        labels = dict.fromkeys((*element.points[:-1], element.right, *((wrt.first(),) if element.n == 1 else ())))
+        for label in labels:
+            other = mode.weights.get(label)
+            if other is not None and other is not nu:
+                memory.hold.add((mode.name, label), other == nu)
