@@ -8,6 +8,7 @@ import pyomo.environ  # noqa: F401  registers Pyomo's own plug-ins first
 from pyomo_fesd.dcs import transformation as _dcs  # noqa: F401
 from pyomo_fesd.elements import transformation as _elements  # noqa: F401
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.march.simulate import simulate
 from pyomo_fesd.plot import plot
 from pyomo_fesd.report import report
 from pyomo_fesd.solver import certify
@@ -15,4 +16,4 @@ from pyomo_fesd.state_jump import state_jump
 from pyomo_fesd.trajectory import element_lengths, physical_time, switches, trajectory
 
 __version__ = '0.1.0'
-__all__ = ['FesdError', 'certify', 'element_lengths', 'physical_time', 'plot', 'report', 'state_jump', 'switches', 'trajectory']
+__all__ = ['FesdError', 'certify', 'element_lengths', 'physical_time', 'plot', 'report', 'simulate', 'state_jump', 'switches', 'trajectory']

@@ -29,12 +29,13 @@ FORMS = {'element': 0, 'stage': 1, 'full': 2}
 
 
 class _Sources(AutoSlots.Mixin):
-    """Private data of the block of a moving grid: the conditions that each aggregated pair stands for."""
+    """Private data of the block of a moving grid: the grid, and the conditions that each aggregated pair stands for."""
 
-    __slots__ = ('conditions',)
+    __slots__ = ('conditions', 'grid')
 
     def __init__(self):
         self.conditions = ComponentMap()
+        self.grid = None
 
 
 Block.register_private_data_initializer(_Sources, scope='pyomo_fesd.elements')
@@ -43,6 +44,16 @@ Block.register_private_data_initializer(_Sources, scope='pyomo_fesd.elements')
 def sources(block):
     """ComponentMap from the aggregated pairs on ``block`` to lists of the conditions that they stand for."""
     return block.private_data('pyomo_fesd.elements').conditions
+
+
+def set_grid(block, grid):
+    """Remember the ``Grid`` of a moving grid on its block."""
+    block.private_data('pyomo_fesd.elements').grid = grid
+
+
+def grid_of(block):
+    """The ``Grid`` of a moving grid, by its block."""
+    return block.private_data('pyomo_fesd.elements').grid
 
 
 @dataclass(frozen=True)

@@ -116,15 +116,11 @@ def _add_values_after(home, jumps, grid, wrt):
     home.reset = Constraint(home.boundary, home.number)
     starts = {}
     for element in grid.elements[:-1]:
-        contributions = ComponentMap()
-        for jump in jumps:
-            for x, J in jump.resets.get(element.right, ()):
-                contributions.setdefault(x, []).append(home.e[jump.name, element.n] * (J - x))
-        for j, (x, terms) in enumerate(contributions.items(), start=1):
+        for j, (x, laws) in enumerate(jumping_states(jumps, element.right).items(), start=1):
             home.number.add(j)
             after = home.after[element.n, j]
             after.value = x.value
-            home.reset.add((element.n, j), after == x + quicksum(terms))
+            home.reset.add((element.n, j), after == x + quicksum(home.e[name, element.n] * (J - x) for name, J in laws))
             starts.setdefault(element.n + 1, {})[id(x)] = after
     owner = grid.element_of()
     for equation in home.model().component_data_objects(Constraint, active=True, descend_into=Block):
@@ -133,6 +129,15 @@ def _add_values_after(home, jumps, grid, wrt):
             start = starts.get(owner[label].n) if label in owner else None
             if start is not None:
                 equation.set_value(replace_expressions(equation.expr, start))
+
+
+def jumping_states(jumps, label):
+    """ComponentMap from the states that jump at ``label`` to ``[(law, value after)]``; the order is that of ``after``."""
+    found = ComponentMap()
+    for jump in jumps:
+        for x, J in jump.resets.get(label, ()):
+            found.setdefault(x, []).append((jump.name, J))
+    return found
 
 
 def unchanged(block, before):

@@ -14,6 +14,7 @@ Leaves: ``memory`` (a block): ``p``, ``n``, ``d``, ``switching``, ``leave``, ``c
 Does not apply: to a condition that ends and begins again inside one element; more elements find it.
 """
 
+import re
 from dataclasses import dataclass
 
 from pyomo.core import Block, Constraint, Set, Var, quicksum, value
@@ -30,6 +31,8 @@ class Mode:
     Attributes
     ----------
     name : str
+    system : str
+        the Disjunction that it belongs to, by the family name of its weights
     weights : dict label -> expression
     conditions : dict label -> tuple of expressions c >= 0
     independent : bool
@@ -37,6 +40,7 @@ class Mode:
     """
 
     name: str
+    system: str
     weights: dict
     conditions: dict
     independent: bool
@@ -53,7 +57,7 @@ class Mode:
 
 def read_modes(model, wrt):
     """The modes with memory of a model, from the marks."""
-    times, marked = TimeIndex(wrt), dict()
+    times, marked = TimeIndex(wrt), {}
     selectors = {id(v) for v, _ in marks.marked(model, marks.SELECTOR)}
     for weight, conditions in marks.marked(model, marks.MEMORY):
         label, name = times.split(weight)
@@ -61,6 +65,7 @@ def read_modes(model, wrt):
     return [
         Mode(
             name,
+            re.sub(r',?\d+\]$', ']', name),
             {t: weight for t, (weight, _) in family.items()},
             {t: tuple(c.expr for c in conditions) for t, (_, conditions) in family.items()},
             all(id(weight) in selectors for weight, _ in family.values()),

@@ -11,6 +11,7 @@ from pyomo_fesd.elements.cross import (
     FORMS,
     add_cross_complementarity,
     read_families,
+    set_grid,
     sources,
     warn_gauss_on_curved_surfaces,
 )
@@ -152,6 +153,7 @@ class FiniteElements(Transformation):
                 warn_gauss_on_curved_surfaces(families)
 
             block = self._block(instance, wrt)
+            set_grid(block, grid)
             add_lengths(block, grid, config.length_bounds)
             for integral, rule in integrands:
                 rebuild(integral, rule, block, grid)
