@@ -15,6 +15,8 @@ MEMORY             Expression (data)         the conditions c >= 0 of a mode wit
 GUARD              Expression (data)         ``True``: a jump of the state happens where this falls to 0 from above
 RESET              Var (data)                the Expression of the value after the jump whose guard stands on the same block
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
+MOVE               Complementarity (data)    another pair whose zero side it may take over; all on one block do so together
+                   Var (data)                where the move starts it; ``True``: worth a look only where it is at its lower bound
 ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
                                              certificate looks beyond them
 PENALTY            Expression                its weight rho; guides the homotopy, never part of the reported objective
@@ -30,6 +32,7 @@ MEMORY = 'fesd_memory'
 GUARD = 'fesd_guard'
 RESET = 'fesd_reset'
 DECIDED = 'fesd_decided'
+MOVE = 'fesd_move'
 ARTIFICIAL = 'fesd_artificial'
 PENALTY = 'fesd_penalty'
 
@@ -46,11 +49,15 @@ def mark(block, name, component, value=True):
     suffix.set_value(component, value, expand=False)
 
 
+def suffixes(block, name):
+    """The Suffixes that hold mark ``name`` on ``block`` and the active blocks below it."""
+    return (s for s in block.component_objects(Suffix, active=True, descend_into=Block) if s.local_name == name)
+
+
 def marked(block, name):
     """All ``(component, value)`` marked ``name`` on ``block`` and the active blocks below it."""
-    for suffix in block.component_objects(Suffix, active=True, descend_into=Block):
-        if suffix.local_name == name:
-            yield from suffix.items()
+    for suffix in suffixes(block, name):
+        yield from suffix.items()
 
 
 def is_generated(component):

@@ -9,7 +9,7 @@ The element right of the boundary starts from ``after`` in place of x; the guard
 arrives at g = 0 and would go on jumps there.
 
 Takes: the marks GUARD and RESET (``pyomo_fesd.state_jump``).
-Leaves: ``jumps`` (a block): ``e``, ``after``, ``reset``, ``guarded``, ``complementarity``; discretisation equations that start
+Leaves: ``jumps`` (a block): ``e``, ``after``, ``reset``, ``guarded``, the pairs ``happens`` and ``binary``; discretisation equations that start
 from ``after``.
 Does not apply: at the first and the last time.
 """
@@ -94,13 +94,14 @@ def add_jumps(block, jumps, grid, wrt):
     home.law = Set(initialize=[j.name for j in jumps], ordered=True)
     home.boundary = Set(initialize=range(1, len(grid.elements)), ordered=True)
     home.e = Var(home.law, home.boundary, bounds=(0, 1), initialize=0)
-    home.complementarity = Complementarity(home.law, home.boundary, [1, 2])
+    home.happens = Complementarity(home.law, home.boundary)
+    home.binary = Complementarity(home.law, home.boundary)
     home.guarded = ConstraintList()
     for jump in jumps:
         for element in grid.elements[:-1]:
             e = home.e[jump.name, element.n]
-            home.complementarity.add((jump.name, element.n, 1), complements(e >= 0, jump.guards[element.right] >= 0))
-            home.complementarity.add((jump.name, element.n, 2), complements(e >= 0, 1 - e >= 0))
+            home.happens.add((jump.name, element.n), complements(e >= 0, jump.guards[element.right] >= 0))
+            home.binary.add((jump.name, element.n), complements(e >= 0, 1 - e >= 0))
         # the pairs keep the guard's sign at the inner boundaries
         paired = {element.right for element in grid.elements[:-1]}
         for label in jump.guards.keys() - paired:

@@ -2,15 +2,17 @@
 
 With the weight nu_{n,i} of mode i in element n, constant in the element, and c_ik = p - n at the boundaries b = 0..N:
 
-    nu_{n,i} in {0, 1}:    0 <= nu_{n,i}  perp  1 - nu_{n,i} >= 0
-    region:                0 <= n_{b,ik}  perp  nu_{b,i} + nu_{b+1,i} >= 0     (the elements on either side)
-    the region's end:      0 <= p_{b,ik}  perp  n_{b,ik} + d_{b,ik} >= 0,      nu_{b,i} - nu_{b+1,i} <= sum_k d_{b,ik}
+    binary:     0 <= nu_{n,i}  perp  1 - nu_{n,i} >= 0
+    parts:      0 <= n_{b,ik}  perp  p_{b,ik} >= 0
+    region:     0 <= n_{b,ik}  perp  nu_{b,i} + nu_{b+1,i} >= 0       (the elements on either side)
+    leaving:    0 <= d_{b,ik}  perp  p_{b,ik} >= 0,                   nu_{b,i} - nu_{b+1,i} <= sum_k d_{b,ik}
 
 so a mode is left (d > 0) only where one of its c_ik is 0, and it cannot go on beyond.  There is no multiplier between 0 and 1:
 modes with memory do not slide.
 
 Takes: the marks MEMORY.
-Leaves: ``memory`` (a block): ``p``, ``n``, ``d``, ``switching``, ``leave``, ``complementarity``, ``hold``.
+Leaves: ``memory`` (a block): ``p``, ``n``, ``d``, ``switching``, ``leave``, ``hold``, and the pairs ``binary``, ``parts``,
+``region`` and ``leaving``.
 Does not apply: to a condition that ends and begins again inside one element; more elements find it.
 """
 
@@ -89,7 +91,9 @@ def add_memory(block, modes, grid, wrt):
     memory.d = Var(*index, dense=False, bounds=(0, 1))
     memory.switching = Constraint(*index)
     memory.leave = Constraint(memory.mode, memory.boundary)
-    memory.complementarity = Complementarity(memory.mode, memory.boundary, Set(initialize=range(2 * most + 1), ordered=True))
+    memory.binary = Complementarity(memory.mode, memory.boundary)
+    for name in ('parts', 'region', 'leaving'):
+        memory.add_component(name, Complementarity(*index))
     memory.hold = Constraint(memory.mode, wrt)
     for mode in modes:
         _add_boundaries(memory, mode, grid, wrt)
@@ -109,11 +113,13 @@ def _add_boundaries(memory, mode, grid, wrt):
             now = value(c, exception=False) or 0.0
             p.value, n.value = max(now, 0.0), max(-now, 0.0)
             memory.switching.add((mode.name, b, k), c == p - n)
+            memory.parts.add((mode.name, b, k), complements(n >= 0, p >= 0))
+            memory.region.add((mode.name, b, k), complements(n >= 0, quicksum(sides) >= 0))
             if inner:
-                left.append(memory.d[mode.name, b, k])
-                left[-1].value = 0.0
-            memory.complementarity.add((mode.name, b, 2 * k - 1), complements(n >= 0, quicksum(sides) >= 0))
-            memory.complementarity.add((mode.name, b, 2 * k), complements(p >= 0, quicksum([n, *left[-1:]]) >= 0))
+                d = memory.d[mode.name, b, k]
+                d.value = 0.0
+                left.append(d)
+                memory.leaving.add((mode.name, b, k), complements(d >= 0, p >= 0))
         if inner:
             memory.leave.add((mode.name, b), before - after <= quicksum(left))
 
@@ -122,7 +128,7 @@ def _add_elements(memory, mode, grid, wrt):
     """nu is 0 or 1, and the same at all points of an element; the first time belongs to the first element."""
     for element in grid.elements:
         nu = mode.weight(element)
-        memory.complementarity.add((mode.name, element.n, 0), complements(nu >= 0, 1 - nu >= 0))
+        memory.binary.add((mode.name, element.n), complements(nu >= 0, 1 - nu >= 0))
         labels = dict.fromkeys((*element.points[:-1], element.right, *((wrt.first(),) if element.n == 1 else ())))
         for label in labels:
             other = mode.weights.get(label)

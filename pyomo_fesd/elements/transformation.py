@@ -22,6 +22,7 @@ from pyomo_fesd.elements.grid import check_resolution, read_grid
 from pyomo_fesd.elements.jumps import add_jumps, read_jumps, refuse_jumping_switches
 from pyomo_fesd.elements.lengths import add_lengths, check_orders, multiply_derivatives
 from pyomo_fesd.elements.memory import add_memory, read_modes
+from pyomo_fesd.elements.moves import add_moves
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
 from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.errors import FesdError
@@ -164,6 +165,7 @@ class FiniteElements(Transformation):
             add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
             if families or modes or jumps:
                 add_equilibration(block, families, modes, grid, config.equilibration, config.rho)
+                add_moves(block, families, modes, jumps, grid)
             else:
                 block.r.fix(1)
 

@@ -68,6 +68,8 @@ class Mpcc:
     penalties : list of (Expression, float)
     artificial : ComponentMap Var -> float
         variables whose bounds belong to the method, with their upper bound in the homotopy
+    moves : list of lists of (component, value)
+        marks MOVE, those of one move together
     objective : ObjectiveData or None
     sources : list of ComplementarityData
         every active condition
@@ -79,6 +81,7 @@ class Mpcc:
     decisions: list = field(default_factory=list)
     penalties: list = field(default_factory=list)
     artificial: object = field(default_factory=ComponentMap)
+    moves: list = field(default_factory=list)
     objective: object = None
     sources: list = field(default_factory=list)
 
@@ -105,6 +108,7 @@ def read_problem(model):
             problem.conditions.append(Condition(source, *condition))
     problem.penalties = list(marks.marked(model, marks.PENALTY))
     problem.artificial = ComponentMap(marks.marked(model, marks.ARTIFICIAL))
+    problem.moves = [list(suffix.items()) for suffix in marks.suffixes(model, marks.MOVE)]
     return problem
 
 
