@@ -16,4 +16,15 @@ from pyomo_fesd.state_jump import state_jump
 from pyomo_fesd.trajectory import element_lengths, physical_time, switches, trajectory
 
 __version__ = '0.1.0'
-__all__ = ['FesdError', 'certify', 'element_lengths', 'physical_time', 'plot', 'report', 'simulate', 'state_jump', 'switches', 'trajectory']
+__all__ = [
+    'FesdError',
+    'certify',
+    'element_lengths',
+    'physical_time',
+    'plot',
+    'report',
+    'simulate',
+    'state_jump',
+    'switches',
+    'trajectory',
+]

@@ -49,15 +49,22 @@ def mark(block, name, component, value=True):
     suffix.set_value(component, value, expand=False)
 
 
-def suffixes(block, name):
-    """The Suffixes that hold mark ``name`` on ``block`` and the active blocks below it."""
-    return (s for s in block.component_objects(Suffix, active=True, descend_into=Block) if s.local_name == name)
+def suffixes(block, name, used=False):
+    """The Suffixes that hold mark ``name`` on ``block`` and the active blocks below it; with ``used`` also those used up."""
+    active = None if used else True
+    return (s for s in block.component_objects(Suffix, active=active, descend_into=Block) if s.local_name == name)
 
 
-def marked(block, name):
+def marked(block, name, used=False):
     """All ``(component, value)`` marked ``name`` on ``block`` and the active blocks below it."""
-    for suffix in suffixes(block, name):
+    for suffix in suffixes(block, name, used):
         yield from suffix.items()
+
+
+def use_up(block, name):
+    """What mark ``name`` asks for has been done: ``marked`` does not find it any more."""
+    for suffix in list(suffixes(block, name)):
+        suffix.deactivate()
 
 
 def is_generated(component):

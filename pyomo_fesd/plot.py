@@ -72,7 +72,7 @@ def _draw(axis, frame, column, wrt):
     if ': ' not in column:
         axis.plot(frame.index, frame[column], '.-', markersize=3, linewidth=1.2, label=label)
         return
-    color, row = axis._get_lines.get_next_color(), {t: k for k, t in enumerate(wrt)}
+    color, row = axis._get_lines.get_next_color(), {t: k for k, t in reversed(list(enumerate(frame['label'])))}
     for k, element in enumerate(read_grid(wrt, [wrt.first(), wrt.last()]).elements):
         inside = [row[t] for t in dict.fromkeys((*element.points, element.right))]
         values = frame[column].iloc[[inside[0], *inside]]

@@ -36,9 +36,10 @@ def state_jump(*sets, guard, reset):
         block.guard = Expression(expr=guard(parent, *index))
         marks.mark(block, marks.GUARD, block.guard)
         resets = reset(parent, *index)
-        block.after = Expression(range(1, len(resets) + 1))
+        values = Expression(range(1, len(resets) + 1))
+        block.add_component(marks.GENERATED + 'after', values)
         for j, (state, after) in enumerate(resets, start=1):
-            block.after[j] = after
-            marks.mark(block, marks.RESET, state, block.after[j])
+            values[j] = after
+            marks.mark(block, marks.RESET, state, values[j])
 
     return Block(*sets, rule=rule)

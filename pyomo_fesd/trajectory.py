@@ -13,9 +13,10 @@ from pyomo_fesd import marks
 from pyomo_fesd.complementarity import Mixed, read
 from pyomo_fesd.elements.cross import sources
 from pyomo_fesd.elements.grid import ONE_ELEMENT_SCHEMES, read_grid
+from pyomo_fesd.elements.jumps import jumping_states, read_jumps
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.records import records
-from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set, strip_time
+from pyomo_fesd.timeindex import TimeIndex, derivatives, discretised, find_continuous_set, strip_time
 
 #: A multiplier nearer than this to 0 (or to 1) counts as off (or on).
 CLEAR = 1e-6
@@ -108,7 +109,38 @@ def trajectory(model, wrt=None):
     for name, modes in _multipliers(model, index).items():
         for mode, weights in modes.items():
             columns[f'{name}: {mode}'] = [_number(weights.get(t)) for t in times]
-    return pd.DataFrame(columns, index=pd.Index(times.values(), name='time'))
+    frame = pd.DataFrame(columns, index=pd.Index(times.values(), name='time'))
+    return _with_values_after(frame, model, wrt)
+
+
+def _with_values_after(frame, model, wrt):
+    """A second row, for the states only, where a state jumps: the values after it."""
+    states = {strip_time(TimeIndex(wrt).split(x)[1]) for d in derivatives(model, wrt) for x in d.get_state_var().values()}
+    rows = []
+    for element, label, _, values in jumps_that_happen(model, wrt):
+        place = int(np.flatnonzero(frame['label'] == label)[0])
+        row = frame.iloc[[place]].copy()
+        row.loc[:, [c for c in frame.columns if c not in states | {'label', 'element'}]] = np.nan
+        row['element'] = element.n + 1
+        for x, after in values:
+            row[strip_time(TimeIndex(wrt).split(x)[1])] = after
+        rows.append((place, row))
+    for place, row in reversed(rows):
+        frame = pd.concat([frame.iloc[: place + 1], row, frame.iloc[place + 1 :]])
+    return frame
+
+
+def jumps_that_happen(model, wrt):
+    """``(element before, its right label, name, [(VarData, value after)])`` of every state jump, in order of time."""
+    block = records(model).grids.get(wrt)
+    home = None if block is None else block.component('jumps')
+    jumps = [] if home is None else read_jumps(model, wrt)
+    for element in _grid(wrt).elements[:-1] if jumps else ():
+        names = [j.name for j in jumps if (home.e[j.name, element.n].value or 0.0) > 0.5]
+        if names:
+            states = jumping_states(jumps, element.right)
+            after = [(x, home.after[element.n, j].value) for j, x in enumerate(states, start=1)]
+            yield element, element.right, ', '.join(names), after
 
 
 def _number(expr):
@@ -171,16 +203,19 @@ def switches(model, wrt=None):
             if before is not None and active != before:
                 found.append(Switch(times[element.left], name, before, active))
             before = active
+    for _, label, name, values in jumps_that_happen(model, wrt):
+        sides = [', '.join(f'{strip_time(index.split(x)[1])} = {v:.6g}' for x, v in both) for both in _both_sides(values)]
+        found.append(Switch(times[label], name, *sides))
     return Switches(sorted(found, key=lambda s: s.time))
+
+
+def _both_sides(values):
+    return [(x, value(x)) for x, _ in values], values
 
 
 def _active(modes, element):
     """The mode with a positive multiplier inside an element; several slide; None where nothing tells."""
-    on = [
-        mode
-        for mode, weights in modes.items()
-        if any(t in weights and value(weights[t]) > CLEAR for t in element.points)
-    ]
+    on = [mode for mode, weights in modes.items() if any(t in weights and value(weights[t]) > CLEAR for t in element.points)]
     if not on:
         return None
     return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on)

@@ -39,6 +39,8 @@ def test_public_names():
         'physical_time',
         'plot',
         'report',
+        'simulate',
+        'state_jump',
         'switches',
         'trajectory',
     ]

@@ -4,8 +4,8 @@
     nu_i = 1  only where c_ik(x) >= 0 for all k           (the region of mode i, its inequalities)
     nu_i falls from 1 to 0 only where some c_ik(x) = 0     (the region ends)
 
-The regions of the modes overlap; in the overlap the last mode decides.  With two modes that share no boundary this is a relay
-with hysteresis, and the state never slides between its modes.
+The regions of the modes overlap; in the overlap the last mode decides.  Two modes that share no boundary are a relay with
+hysteresis; a mode without a condition never ends, such as that of a disc that has burst.
 
 Takes: a ``MemorySystem``.
 Leaves: ``nu`` (two modes: one, as in eq. 5), ``weight`` of every mode and ``condition`` as Expressions, ``simplex`` for more
@@ -20,7 +20,7 @@ from pyomo.core import Constraint, Expression, Set, Var
 
 from pyomo_fesd import marks
 from pyomo_fesd.dcs.modes import ModeEquations
-from pyomo_fesd.dcs.regions import conditions, refuse_gaps
+from pyomo_fesd.dcs.regions import conditions
 
 NAME = 'memory'
 
@@ -50,15 +50,13 @@ def read(reader, disjunction):
     Raises
     ------
     FesdError
-        for what every Disjunction is refused for, but not for overlaps
+        for what every Disjunction is refused for, but not for overlaps, gaps, or modes without a region
     """
     modes = reader.modes(disjunction, fixed_are_left_out=False)
     if len(modes) == 1:
         return reader.read(disjunction)
     equations, inequalities = reader.contents(disjunction, modes)
-    stated = [[c for con in cons for c in conditions(con)] for cons in inequalities]
-    refuse_gaps(disjunction, modes, stated)
-    return MemorySystem(disjunction, modes, stated, equations)
+    return MemorySystem(disjunction, modes, [[c for con in cons for c in conditions(con)] for cons in inequalities], equations)
 
 
 def applies(system):

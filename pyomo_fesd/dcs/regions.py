@@ -86,28 +86,6 @@ def read_regions(disjunction, disjuncts, inequalities, cache):
     return Regions(functions, cache[key])
 
 
-def refuse_gaps(disjunction, disjuncts, stated):
-    """For modes with memory: regions may overlap, but some mode must be possible everywhere.
-
-    Parameters
-    ----------
-    stated : list of lists of expressions
-        the conditions c >= 0 of each disjunct
-    """
-    for disjunct, cs in zip(disjuncts, stated):
-        if not cs:
-            raise FesdError(
-                disjunct,
-                f"this mode of Disjunction '{disjunction.name}' has no region condition: it would never end",
-                "add the inequality on the states up to which the mode goes on",
-            )
-    functions, values, S = _sign_matrix(disjunction, disjuncts, stated)
-    possible = _possibility(_relations(values), len(functions))
-    for pattern in itertools.product((1, -1), repeat=len(functions)):
-        if not _owners(S, pattern) and possible(pattern):
-            raise _not_a_partition(disjunction, disjuncts, functions, pattern, [], "let the regions cover the state space")
-
-
 def _sign_matrix(disjunction, disjuncts, stated):
     """Collect the distinct switching functions; S[i, k] = +-1 where mode i needs that sign of c_k, 0 where it does not say."""
     sampled = _sample(disjunction, [c for cs in stated for c in cs])

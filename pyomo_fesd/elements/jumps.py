@@ -9,8 +9,8 @@ The element right of the boundary starts from ``after`` in place of x; the guard
 arrives at g = 0 and would go on jumps there.
 
 Takes: the marks GUARD and RESET (``pyomo_fesd.state_jump``).
-Leaves: ``jumps`` (a block): ``e``, ``after``, ``reset``, ``guarded``, the pairs ``happens`` and ``binary``; discretisation equations that start
-from ``after``.
+Leaves: ``jumps`` (a block): ``e``, ``after``, ``reset``, ``guarded``, the pairs ``happens`` and ``binary``; discretisation
+equations that start from ``after``.
 Does not apply: at the first and the last time.
 """
 
@@ -44,7 +44,7 @@ class Jump:
 
 
 def read_jumps(model, wrt):
-    """The laws of reset of a model, from the marks.
+    """The laws of reset of a model, from the marks, also after they are used up.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def read_jumps(model, wrt):
     """
     times, found = TimeIndex(wrt), {}
     states = ComponentSet(d.get_state_var() for d in derivatives(model, wrt))
-    for guard, _ in marks.marked(model, marks.GUARD):
+    for guard, _ in marks.marked(model, marks.GUARD, used=True):
         home = guard.parent_block()
         label, name = times.split(home)
         resets = [(x, after.expr) for x, after in marks.marked(home, marks.RESET)]
@@ -90,6 +90,7 @@ def add_jumps(block, jumps, grid, wrt):
     """Put the jumps at the inner boundaries of ``grid`` on ``block``, and let elements start after them."""
     if not jumps:
         return
+    marks.use_up(block.model(), marks.GUARD)
     block.jumps = home = Block()
     home.law = Set(initialize=[j.name for j in jumps], ordered=True)
     home.boundary = Set(initialize=range(1, len(grid.elements)), ordered=True)

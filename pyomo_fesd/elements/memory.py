@@ -58,10 +58,10 @@ class Mode:
 
 
 def read_modes(model, wrt):
-    """The modes with memory of a model, from the marks."""
+    """The modes with memory of a model, from the marks, also after they are used up."""
     times, marked = TimeIndex(wrt), {}
     selectors = {id(v) for v, _ in marks.marked(model, marks.SELECTOR)}
-    for weight, conditions in marks.marked(model, marks.MEMORY):
+    for weight, conditions in marks.marked(model, marks.MEMORY, used=True):
         label, name = times.split(weight)
         marked.setdefault(name, {})[label] = (weight.expr, conditions)
     return [
@@ -80,7 +80,8 @@ def add_memory(block, modes, grid, wrt):
     """Put the law of switching between the elements of ``grid`` on ``block``; the marks are used up."""
     if not modes:
         return
-    most = max(len(cs) for mode in modes for cs in mode.conditions.values())
+    marks.use_up(block.model(), marks.MEMORY)
+    most = max((len(cs) for mode in modes for cs in mode.conditions.values()), default=0)
     block.memory = memory = Block()
     memory.mode = Set(initialize=[m.name for m in modes], ordered=True)
     memory.boundary = Set(initialize=range(len(grid.elements) + 1), ordered=True)

@@ -61,7 +61,6 @@ class Memory:
         self._active = max(others, key=lambda m: _room(m, label))
         return True
 
-
     def settle(self, home, grid, first):
         """What the law of switching between elements says at the values of the march: p, n and d at every boundary."""
         labels = [first, *(e.right for e in grid.elements)]
@@ -79,7 +78,7 @@ class Memory:
 
 
 def _room(mode, label):
-    return min(value(c) for c in mode.conditions[label])
+    return min((value(c) for c in mode.conditions[label]), default=float('inf'))
 
 
 class Jumps:

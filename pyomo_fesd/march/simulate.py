@@ -23,9 +23,11 @@ from pyomo_fesd.elements.cross import grid_of
 from pyomo_fesd.elements.jumps import read_jumps
 from pyomo_fesd.elements.memory import read_modes
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.indicators import set_indicators
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.window import Window, small_model, solver, variables_of
 from pyomo_fesd.records import records
+from pyomo_fesd.review import review
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
 from pyomo_fesd.trajectory import trajectory
 
@@ -64,6 +66,8 @@ def simulate(model, wrt=None, inputs=(), **options):
     march = March(model, wrt, inputs, options)
     with march.given():
         march.run()
+    set_indicators(model)
+    review(model)
     return trajectory(model, wrt)
 
 
@@ -197,7 +201,7 @@ class March:
                 return h
         self._require(results)
         raise FesdError(
-            self._model,
+            self._wrt,
             f"simulate: no step is possible from time {self._time:.6g}",
             "look for a bound that the solution reaches there, or for a state from which no mode leads on",
         )
@@ -205,7 +209,7 @@ class March:
     def _require(self, results):
         if results.solver.stationarity != 'B':
             raise FesdError(
-                self._model,
+                self._wrt,
                 f"simulate: no solution at time {self._time:.6g}: {results.solver.reason}",
                 "check the equations there; more elements help where the solution is steep",
             )
@@ -230,13 +234,13 @@ class March:
         events, limit = [t for times in self._events.values() for t in times], self._accumulate()
         if limit is not None:
             return FesdError(
-                self._model,
+                self._wrt,
                 "simulate: the switches accumulate (Zeno): the last ones are at times "
                 f"{', '.join(f'{t:.6g}' for t in events[-SHRINKING:])}, their limit is about {limit:.6g}",
                 "no number of elements reaches beyond: end before, or model what happens there (a rest, a slide)",
             )
         return FesdError(
-            self._model,
+            self._wrt,
             f"simulate: the elements of control stage {stage} are used up at time {self._time:.6g}, after {len(events)} switches",
             "take more elements (nfe)",
         )

@@ -23,6 +23,10 @@ REFUSED = {
 }
 
 
+#: Marks that only moving elements can give their meaning.
+UNDONE = {marks.MEMORY: "a mode with memory", marks.GUARD: "a state jump"}
+
+
 @dataclass(frozen=True)
 class Condition:
     """One scalar pair 0 <= G perp H >= 0, with the component that it came from."""
@@ -122,6 +126,11 @@ def _refuse(model):
             raise FesdError(
                 v, "an integer variable", "fix it, or relax its domain: mpec_hybrid decides complementarities, not integers"
             )
+
+    for name, what in UNDONE.items():
+        found = next(marks.marked(model, name), None)
+        if found is not None:
+            raise FesdError(found[0], f"{what} on a grid whose elements do not move", "apply fesd.finite_elements first")
 
 
 def _objective(model):
