@@ -15,6 +15,7 @@ Does not apply: to switching functions of algebraic variables (the first), or wi
 """
 
 import logging
+from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +33,7 @@ from pyomo_fesd.elements.jumps import read_jumps
 from pyomo_fesd.elements.memory import read_modes
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import DISCRETISATION, TimeIndex, derivatives, strip_time
-from pyomo_fesd.trajectory import physical_time
+from pyomo_fesd.trajectory import jumps_that_happen, physical_time
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -74,6 +75,9 @@ class _Look:
         self._grid, self._index, self._time = grid_of(block), TimeIndex(wrt), physical_time(model, wrt)
         self._rates = ComponentMap((d.get_state_var(), d) for d in derivatives(model, wrt))
         self._switching = list(self._read())
+        self._starts = defaultdict(ComponentMap)
+        for before, _, _, values in jumps_that_happen(model, wrt):
+            self._starts[before.n + 1] = ComponentMap(values)
 
     def _read(self):
         """The switching functions with one multiplier: those of eq. (5), also in the Heaviside form."""
@@ -89,7 +93,10 @@ class _Look:
             if nu in selectors or nu.parent_component() in selectors:
                 label, name = self._index.split(condition)
                 equation = rule[n.index()]
-                p = equation.parent_block().p[n.index()]
+                parts = equation.parent_block().component('p')
+                if parts is None:
+                    continue  # Stewart's lam belongs to a mode, not to a switching function
+                p = parts[n.index()]
                 family = found.setdefault(name, _Switching(_name(name), {}, {}))
                 # c == p - n
                 family.nu[label], family.c[label] = nu, equation.body - equation.upper + p - n
@@ -196,30 +203,31 @@ class _Look:
         labels = (element.left, *element.points)
         if any(t not in functions for t in labels):
             return None
-        at_nodes = np.array([sign * value(functions[t]) for t in labels])
-        largest = np.abs(at_nodes).max()
-        if largest <= ZERO or at_nodes.min() > 0.5 * np.ptp(at_nodes):
-            return None
+        at_stages = np.array([sign * value(functions[t]) for t in element.points])
+        largest = np.abs(at_stages).max()
+        if largest <= ZERO or at_stages.min() > 2 * np.ptp(at_stages):
+            return None  # it slides, or stays far from zero
         tau, inside = np.array([0.0, *self._grid.tau]), np.linspace(0.0, 1.0, 14)[1:-1]
-        values = sign * self._between(functions, labels, tau, inside)
+        values = sign * self._between(functions, element, tau, inside)
         worst = int(np.argmin(values))
         if values[worst] >= -EXCURSION * max(largest, np.abs(values).max()):
             return None
         start, end = self._time[element.left], self._time[element.right]
         return start + inside[worst] * (end - start)
 
-    @staticmethod
-    def _between(functions, labels, tau, inside):
-        """The function at relative times ``inside``, of variables interpolated between the ``labels`` at ``tau``."""
-        rows = [list(identify_variables(functions[t], include_fixed=True)) for t in labels]
-        polynomials = [BarycentricInterpolator(tau, [v.value for v in vs])(inside) for vs in zip(*rows)]
+    def _between(self, functions, element, tau, inside):
+        """The function at relative times ``inside``, of variables interpolated between the points of an element."""
+        rows = [list(identify_variables(functions[t], include_fixed=True)) for t in (element.left, *element.points)]
+        numbers = [[v.value for v in row] for row in rows]
+        numbers[0] = [self._starts[element.n].get(v, v.value) for v in rows[0]]
+        polynomials = [BarycentricInterpolator(tau, column)(inside) for column in zip(*numbers)]
         kept = [(v, v.value, v.stale) for v in rows[-1]]
         try:
             values = []
             for k in range(len(inside)):
                 for v, polynomial in zip(rows[-1], polynomials):
                     v.set_value(polynomial[k], skip_validation=True)
-                values.append(value(functions[labels[-1]]))
+                values.append(value(functions[element.points[-1]]))
         finally:
             for v, old, stale in kept:
                 v.set_value(old, skip_validation=True)

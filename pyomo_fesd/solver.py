@@ -168,7 +168,8 @@ class MpecHybrid(SolverBase):
             raise NoOptimalSolutionError(f"mpec_hybrid: {results.extra_info.outcome}. {results.extra_info.reason}")
         if config.load_solutions and results.solution_loader.get_number_of_solutions():
             results.solution_loader.load_solution()
-            results.extra_info.warnings = review(model) if optimal else []
+            feasible = results.solution_status in (SolutionStatus.optimal, SolutionStatus.feasible)
+            results.extra_info.warnings = review(model) if feasible else []
         return results
 
 

@@ -7,7 +7,7 @@ Does not apply: to complementarities without time.
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap, ComponentSet
@@ -70,6 +70,8 @@ class Family:
         for each side, whether it is continuous in time and so enters with its boundary values too
     rule : Constraint or None
         what ties the continuous side to the states, where it is a marked variable
+    starts : dict element number -> Pair
+        the sides after the left boundary of an element, where a state jumps there
     jumps_with_controls : bool
         the continuous side contains a control that is held on each stage: no continuity from one stage to the next
     """
@@ -80,6 +82,7 @@ class Family:
     continuous: tuple
     rule: object = None
     jumps_with_controls: bool = False
+    starts: dict = field(default_factory=dict)
 
     def points(self, element):
         """Stage labels of ``element`` at which the condition exists."""
@@ -87,12 +90,14 @@ class Family:
 
     def values(self, element, side, right_is_stage):
         """Side 0 or 1 at the labels that take part in ``element``: its stages, and its boundaries if it is continuous."""
-        labels = self.points(element)
-        if self.continuous[side]:
-            left = () if element.opens_stage and self.jumps_with_controls else (element.left,)
-            boundaries = left if right_is_stage else (*left, element.right)
-            labels = labels + [t for t in boundaries if t in self.sides]
-        return [self.sides[t][side] for t in labels]
+        values = [self.sides[t][side] for t in self.points(element)]
+        if not self.continuous[side]:
+            return values
+        if not (element.opens_stage and self.jumps_with_controls) and element.left in self.sides:
+            values.append(self.starts.get(element.n, self.sides[element.left])[side])
+        if not right_is_stage and element.right in self.sides:
+            values.append(self.sides[element.right][side])
+        return values
 
 
 def read_families(block, wrt, controls, told=()):

@@ -14,7 +14,7 @@ equations that start from ``after``.
 Does not apply: at the first and the last time.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint, ConstraintList, Set, Var, quicksum
@@ -69,23 +69,6 @@ def read_jumps(model, wrt):
     return list(found.values())
 
 
-def refuse_jumping_switches(families, jumps):
-    """A switching function of a state that jumps has two values at a boundary; not supported."""
-    jumping = ComponentSet(x.parent_component() for j in jumps for resets in j.resets.values() for x, _ in resets)
-    for family in families:
-        if not (jumping and family.continuous[1]):
-            continue
-        expressions = [family.sides[t][1] for t in list(family.sides)[:1]]
-        expressions += [c.body for c in list(family.rule.values())[:1]] if family.rule is not None else []
-        for v in (v for e in expressions for v in identify_variables(e, include_fixed=True)):
-            if v.parent_component() in jumping:
-                raise FesdError(
-                    family.name,
-                    f"it switches on '{v.parent_component().name}', which jumps",
-                    "let the switching function be one of states that do not jump",
-                )
-
-
 def add_jumps(block, jumps, grid, wrt):
     """Put the jumps at the inner boundaries of ``grid`` on ``block``, and let elements start after them."""
     if not jumps:
@@ -131,6 +114,87 @@ def _add_values_after(home, jumps, grid, wrt):
             start = starts.get(owner[label].n) if label in owner else None
             if start is not None:
                 equation.set_value(replace_expressions(equation.expr, start))
+
+
+def start_after_jumps(block, families, jumps, grid, wrt):
+    """Families whose continuous side depends on a state that jumps enter an element with the value after the jump.
+
+    A side that is an expression of states is taken at ``after``.  What a Constraint ties to the states (lam, mu, p, n) gets a
+    copy of variable and Constraint for the right limit of each inner boundary: ``copy`` and ``copied``.
+    """
+    if not jumps:
+        return families
+    copies = _Copies(block, jumps, grid, wrt)
+    return [replace(f, starts=copies.starts(f)) if any(f.continuous) else f for f in families]
+
+
+class _Copies:
+    """Right limits at the inner boundaries of everything that depends on states that jump."""
+
+    def __init__(self, block, jumps, grid, wrt):
+        self._home, self._jumps, self._grid, self._times = block.jumps, jumps, grid, TimeIndex(wrt)
+        self._rules = ComponentMap(marks.marked(block.model(), marks.CONTINUOUS))
+        self._rows, self._known, self._made = {}, {}, ComponentSet()
+        self._home.place = Set(dimen=1)
+        self._home.copy = Var(self._home.boundary, self._home.place, dense=False)
+        self._home.copied = Constraint(self._home.boundary, self._home.place)
+
+    def starts(self, family):
+        """Element number -> the pair of sides after the boundary on its left; elements where nothing differs are left out."""
+        found = {}
+        for before in self._grid.elements[:-1]:
+            if before.right in family.sides:
+                swap = self._swap(before, family.sides[before.right])
+                if swap:
+                    pair = family.sides[before.right]
+                    found[before.n + 1] = type(pair)(*(replace_expressions(side, swap) for side in pair))
+        return found
+
+    def _swap(self, before, pair):
+        """id of a variable at the boundary -> what stands for it after the jump."""
+        states = jumping_states(self._jumps, before.right)
+        after = {id(x): self._home.after[before.n, j] for j, x in enumerate(states, start=1)}
+        variables = [v for side in pair for v in _variables(side)]
+        rows = [row for v in variables for row in self._rows_of(v, before.right)]
+        swap = {id(v): after[id(v)] for v in variables if id(v) in after}
+        if any(id(v) in after for row in rows for v in _variables(row.body)):
+            swap |= self._copy(before, ComponentSet(rows), after)
+        return swap
+
+    def _rows_of(self, v, label):
+        """The Constraints at ``label`` that tie a marked variable to the states."""
+        rule = self._rules.get(v.parent_component())
+        if rule is None or rule.ctype is not Constraint:
+            return []
+        if rule not in self._rows:
+            self._rows[rule] = self._times.families(rule.values())
+        at_label = [family[label] for family in self._rows[rule].values() if label in family]
+        return [row for row in at_label if any(u is v for u in _variables(row.body))]
+
+    def _copy(self, before, rows, after):
+        """Copies of the marked variables of ``rows``, and the rows for them."""
+        home, known = self._home, self._known.setdefault(before.n, {})
+        for row in rows:
+            for v in _variables(row.body):
+                if id(v) not in after and id(v) not in known and v.parent_component() in self._rules:
+                    known[id(v)] = home.copy[before.n, self._place('copy', before.n)]
+                    known[id(v)].bounds, known[id(v)].value = (v.lower, v.upper), v.value
+        for row in (r for r in rows if r not in self._made):
+            self._made.add(row)
+            body = replace_expressions(row.body, after | known)
+            home.copied.add((before.n, self._place('copied', before.n)), body == row.upper)
+        return known
+
+    def _place(self, name, boundary):
+        """The next free place of an indexed component at a boundary."""
+        component = self._home.component(name)
+        place = 1 + sum(1 for b, _ in component if b == boundary)
+        self._home.place.add(place)
+        return place
+
+
+def _variables(expr):
+    return list(identify_variables(expr, include_fixed=True)) if hasattr(expr, 'is_expression_type') else []
 
 
 def jumping_states(jumps, label):

@@ -19,7 +19,7 @@ from pyomo_fesd.elements.equilibration import MODES, add_equilibration
 from pyomo_fesd.elements.expansion import discretise
 from pyomo_fesd.elements.explicit_time import warn_explicit_time
 from pyomo_fesd.elements.grid import check_resolution, read_grid
-from pyomo_fesd.elements.jumps import add_jumps, read_jumps, refuse_jumping_switches
+from pyomo_fesd.elements.jumps import add_jumps, read_jumps, start_after_jumps
 from pyomo_fesd.elements.lengths import add_lengths, check_orders, multiply_derivatives
 from pyomo_fesd.elements.memory import add_memory, read_modes
 from pyomo_fesd.elements.moves import add_moves
@@ -140,7 +140,6 @@ class FiniteElements(Transformation):
             check_orders(instance.model(), wrt)
             families = read_families(instance, wrt, config.piecewise_constant, config.continuous)
             modes, jumps = read_modes(instance.model(), wrt), read_jumps(instance.model(), wrt)
-            refuse_jumping_switches(families, jumps)
             waiting = next(_active_disjunctions(instance, wrt), None)
             if waiting is not None and not (families or modes or jumps):
                 raise FesdError(
@@ -159,6 +158,7 @@ class FiniteElements(Transformation):
             hold_controls(block, config.piecewise_constant, grid, wrt)
             multiply_derivatives(instance.model(), wrt, block, grid)
             add_jumps(block, jumps, grid, wrt)
+            families = start_after_jumps(block, families, jumps, grid, wrt)
             add_memory(block, modes, grid, wrt)
             add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
             if families or modes or jumps:

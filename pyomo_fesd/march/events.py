@@ -120,6 +120,21 @@ class Jumps:
             self._home.after[boundary, j].set_value(value(self._home.reset[boundary, j].expr.args[1]), skip_validation=True)
         return happened
 
+    def copies(self, boundary):
+        """The copies of multipliers after a boundary, by place, and their rows."""
+        home = self._home
+        if home is None:
+            return {}, []
+        rows = [c.expr for (b, _), c in home.copied.items() if b == boundary]
+        return {k: v for (b, k), v in home.copy.items() if b == boundary}, rows
+
+    def take(self, pattern, boundary):
+        """Bring the copies of the pattern's boundary to another one."""
+        others = self.copies(boundary)[0]
+        for place, v in self.copies(pattern)[0].items():
+            if place in others:
+                others[place].set_value(v.value, skip_validation=True)
+
     def put(self, pattern, boundary):
         """Copy the values after ``boundary`` to the boundary of the pattern."""
         for (b, j), after in self._home.after.items() if self._home is not None else ():

@@ -25,7 +25,7 @@ from pyomo_fesd.elements.memory import read_modes
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.indicators import set_indicators
 from pyomo_fesd.march.events import Jumps, Memory
-from pyomo_fesd.march.window import Window, small_model, solver, variables_of
+from pyomo_fesd.march.window import TRIES, Window, small_model, solver, variables_of
 from pyomo_fesd.records import records
 from pyomo_fesd.review import review
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
@@ -177,8 +177,12 @@ class March:
         rows = [c.expr for c in self._equations(labels[1:])] + [c.expr for c in self._signs(labels)]
         for label in labels[1:]:
             rows += [row for memory in self._memories for row in memory.rows(label)] + self._jumps.rows(label)
+        copies, more = self._jumps.copies(n - 1)
+        rows += more
         pairs = [read(c) for index, c in self._block.cross.items() if index[1] == n]
-        return Window(self._home('pattern'), self._block.r[n], labels, rows, pairs, self._given, self._times, self._options)
+        return Window(
+            self._home('pattern'), self._block.r[n], labels, rows, pairs, copies.values(), self._given, self._times, self._options
+        )
 
     def _home(self, name):
         self._scratch.add_component(name, Block())
@@ -193,10 +197,11 @@ class March:
             self._jumps.stay(self._pattern.n - 1, element.left, self._times)
         else:
             self._jumps.put(self._pattern.n - 1, element.n - 1)
-        for attempt in (warm, False) if warm else (False,):
-            r, results = window.solve(labels, share / self._pattern.length, attempt)
+        for options in TRIES[not warm :]:
+            r, results = window.solve(labels, share / self._pattern.length, options)
             h = r * self._pattern.length
             if results.solver.stationarity == 'B' and h > NO_STEP * share:
+                self._jumps.take(self._pattern.n - 1, element.n - 1)
                 self._block.r[element.n].set_value(h / element.length, skip_validation=True)
                 return h
         self._require(results)

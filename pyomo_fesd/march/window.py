@@ -15,8 +15,11 @@ from pyomo.core import ConstraintList, Objective, maximize
 from pyomo.core.expr.visitor import identify_mutable_parameters, identify_variables
 from pyomo.mpec import Complementarity, complements
 
-#: Options of the small problems: near a known start, and nothing but the point is wanted.
-OPTIONS = {'lpec': 'reduced', 'raise_exception_on_nonoptimal_result': False}
+#: Options of the small problems: a point that is not certified is judged by the march.
+OPTIONS = {'raise_exception_on_nonoptimal_result': False}
+#: How an element is tried, one after the other: from where the last one ended; from afar; with other starts.  A step of no
+#: length is a local solution of its own where a switch lies on the left boundary, so the later ones look farther.
+TRIES = ({'warm_start': True, 'lpec': 'reduced'}, {'lpec': 'full'}, {'lpec': 'full', 'starts': 6})
 
 
 def solver(options):
@@ -58,18 +61,21 @@ class Window:
         labels of the pattern: its left boundary, then its own
     rows : list of relational expressions
     pairs : list of Pair
+    more : iterable of VarData
+        unknowns that have no label
     given : ComponentSet of VarData
         variables at the pattern's labels that the march knows: inputs, weights of modes with memory
     times : TimeIndex
     """
 
-    def __init__(self, home, r, labels, rows, pairs, given, times, options):
+    def __init__(self, home, r, labels, rows, pairs, more, given, times, options):
         self._r, self._times, self._labels = r, times, labels
         expressions = [*rows, *(side for pair in pairs for side in pair)]
         everything = variables_of(expressions)
         self.unknown = ComponentSet(
             v for v in everything if v is r or (times.time(v) in labels[1:] and not v.fixed and v not in given)
         )
+        self.unknown.update(more)
         fixed = [v for v in everything if v not in self.unknown]
         params = ComponentSet(p for e in expressions if hasattr(e, 'args') for p in identify_mutable_parameters(e))
         self.parameters = [*fixed, *params]
@@ -81,8 +87,8 @@ class Window:
             v.fix()
         self._solver.set_instance(self.model, parameters=self.parameters)
 
-    def solve(self, labels, r_most, warm):
-        """Put in the values at ``labels`` of another element, solve, take out; returns (r, whether it is certified)."""
+    def solve(self, labels, r_most, options):
+        """Put in the values at ``labels`` of another element, solve with ``options``, take out; returns (r, results)."""
         places = dict(zip(self._labels, labels))
         for data in self.parameters:
             source = self._counterpart(data, places)
@@ -90,7 +96,7 @@ class Window:
                 data.set_value(source.value, **({'skip_validation': True} if data.is_variable_type() else {}))
         self._r.setub(r_most)
         self._r.set_value(r_most, skip_validation=True)
-        results = self._solver.solve(self.model, warm_start=warm)
+        results = self._solver.solve(self.model, **options)
         for v in self.unknown:
             target = self._counterpart(v, places)
             if target is not None and target is not v:
