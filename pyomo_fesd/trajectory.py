@@ -116,9 +116,9 @@ def trajectory(model, wrt=None):
 def _with_values_after(frame, model, wrt):
     """A second row, for the states only, where a state jumps: the values after it."""
     states = {strip_time(TimeIndex(wrt).split(x)[1]) for d in derivatives(model, wrt) for x in d.get_state_var().values()}
-    rows = []
+    rows, place_of = [], {t: k for k, t in enumerate(wrt)}
     for element, label, _, values in jumps_that_happen(model, wrt):
-        place = int(np.flatnonzero(frame['label'] == label)[0])
+        place = place_of[label]
         row = frame.iloc[[place]].copy()
         row.loc[:, [c for c in frame.columns if c not in states | {'label', 'element'}]] = np.nan
         row['element'] = element.n + 1
@@ -128,6 +128,15 @@ def _with_values_after(frame, model, wrt):
     for place, row in reversed(rows):
         frame = pd.concat([frame.iloc[: place + 1], row, frame.iloc[place + 1 :]])
     return frame
+
+
+def row_of_label(model, wrt):
+    """Where the row of each label stands in ``trajectory``; a jump has a second row after its own."""
+    second, row, rows = {label for _, label, _, _ in jumps_that_happen(model, wrt)}, 0, {}
+    for label in wrt:
+        rows[label] = row
+        row += 2 if label in second else 1
+    return rows
 
 
 def jumps_that_happen(model, wrt):
