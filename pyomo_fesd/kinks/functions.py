@@ -14,7 +14,7 @@ from pyomo.core import is_constant, value
 
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.kinks.bounds import known_sign
-from pyomo_fesd.kinks.home import add_to_block, check, next_name
+from pyomo_fesd.kinks.home import add_to_block, check, next_number
 
 
 def maximum(block, *args):
@@ -115,10 +115,10 @@ def _smaller(block, a, b):
 def _positive_part(block, z):
     """max(0, z), and the sign of z if declared bounds tell it, else 0."""
     check(block, z)
-    name, sign = next_name(block), known_sign(z)
+    number, sign = next_number(block), known_sign(z)
     if sign:
         return (z if sign > 0 else 0), sign
-    return add_to_block(block, name, z), 0
+    return add_to_block(block, number, z), 0
 
 
 def _is_number(a):

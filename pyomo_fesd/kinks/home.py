@@ -77,20 +77,20 @@ def check(block, z):
                 )
 
 
-def next_name(block):
-    """The name of the next kink on a user's block.
+def next_number(block):
+    """The number of the next kink on a user's block.
 
-    Kinks that bounds decide are counted too, so that the same kink has the same name at all times.
+    Kinks that bounds decide are counted too, so that the same kink has the same number at all times.
     """
     private = _private(block)
     private.asked += 1
-    return f'{marks.GENERATED}kink_{private.asked}'
+    return private.asked
 
 
-def add_to_block(block, name, z):
-    """s = max(0, z) in a generated block of its own."""
+def add_to_block(block, number, z):
+    """s = max(0, z) for the kink ``number`` of a user's block, in a generated block of its own."""
     home = Block()
-    block.add_component(name, home)
+    _generated(block, 'functions').add_component(f'kink_{number}', home)
     kink.declare(home)
     return kink.add(home, (), z)
 
@@ -106,7 +106,7 @@ def add_for_source(source, number, z):
 
 def kinks_of(source):
     """How many numbers are taken by the kinks that ``source`` has."""
-    home, index = _home(source, make=False), _index(source)
+    home, index = _find(source), _index(source)
     return max((k for k in home.numbers if (*index, k) in home.complementarity), default=0) if home is not None else 0
 
 
@@ -121,17 +121,30 @@ def _index(source):
     return () if index is None else index if isinstance(index, tuple) else (index,)
 
 
-def _home(source, make=True):
-    """The block of all kinks of the component of ``source``."""
-    component, parent = source.parent_component(), source.parent_block()
-    everything = parent.component(marks.GENERATED + 'kinks')
-    if everything is None and make:
-        everything = Block()
-        parent.add_component(marks.GENERATED + 'kinks', everything)
-    home = everything.component(component.local_name) if everything is not None else None
-    if home is None and make:
-        home = Block()
-        everything.add_component(component.local_name, home)
+def _generated(block, name):
+    """The generated block ``name`` on ``block``, made if there is none.
+
+    What lies in it has names of its own: reports leave out the names of generated blocks.
+    """
+    found = block.component(marks.GENERATED + name)
+    if found is None:
+        found = Block()
+        block.add_component(marks.GENERATED + name, found)
+    return found
+
+
+def _find(source):
+    """The block of all kinks of the component of ``source``; None if it has none."""
+    everything = source.parent_block().component(marks.GENERATED + 'kinks')
+    return None if everything is None else everything.component(source.parent_component().local_name)
+
+
+def _home(source):
+    """The same, made if there is none."""
+    home = _find(source)
+    if home is None:
+        home, component = Block(), source.parent_component()
+        _generated(source.parent_block(), 'kinks').add_component(component.local_name, home)
         home.numbers = Set(dimen=1)
         kink.declare(home, *([component.index_set()] if component.is_indexed() else []), home.numbers)
     return home
