@@ -18,14 +18,29 @@ def _negation(args):
 
 def _product(args):
     a, b = args
+    if b.__class__ in native_types:
+        a, b = b, a
     if a.__class__ in native_types:
         return [(a, b)]
-    return [(b, a)] if b.__class__ in native_types else None
+    for multiple, other in ((a, b), (b, a)):
+        factor, rest = _factor(multiple)
+        if factor != 1:
+            return [(factor, rest * other)]
+    return None
 
 
 def _quotient(args):
     a, b = args
-    return [(1 / b, a)] if b.__class__ in native_types else None
+    if b.__class__ in native_types:
+        return [(1 / b, a)]
+    factor, rest = (a, 1) if a.__class__ in native_types else _factor(a)
+    return [(factor, rest / b)] if factor != 1 else None
+
+
+def _factor(e):
+    """The number, and the rest, of an expression that is a multiple: Pyomo writes x - p*y as x + (-p)*y."""
+    parts = linear_parts(e, e.args) if e.__class__ in LINEAR else ()
+    return parts[0] if parts and len(parts) == 1 else (1, e)
 
 
 #: Expression type -> function from its arguments to ``[(number, argument)]``, None if it is not linear in them.
