@@ -97,17 +97,19 @@ def add_to_block(block, number, z):
 
 def add_for_source(source, number, z):
     """s = max(0, z) for the kink ``number`` of a constraint, objective or named Expression, in a block beside it."""
-    home, index = _home(source), _index(source)
+    home = _home(source)
     home.numbers.add(number)
-    s = kink.add(home, (*index, number), z)
-    _private(home).source[home.complementarity[(*index, number)]] = source
+    s = kink.add(home, (*_index(source), number), z)
+    _private(home).source[home.complementarity[s.index()]] = source
     return s
 
 
 def kinks_of(source):
     """How many numbers are taken by the kinks that ``source`` has."""
     home, index = _find(source), _index(source)
-    return max((k for k in home.numbers if (*index, k) in home.complementarity), default=0) if home is not None else 0
+    if home is None:
+        return 0
+    return max((k for k in home.numbers if ((*index, k) if index else k) in home.complementarity), default=0)
 
 
 def source_of(condition):

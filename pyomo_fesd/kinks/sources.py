@@ -2,6 +2,7 @@
 
 from pyomo.core import Block, Constraint, Expression, Objective
 from pyomo.core.base.block import BlockData
+from pyomo.gdp import Disjunct
 
 from pyomo_fesd.errors import FesdError
 
@@ -15,7 +16,7 @@ def sources(instance, targets):
             raise FesdError(target, "this target belongs to another model", "give a component of the model itself")
         if target.ctype is Block:
             for block in [target] if isinstance(target, BlockData) else target.values():
-                yield from block.component_data_objects((Constraint, Objective), active=True, descend_into=Block)
+                yield from block.component_data_objects((Constraint, Objective), active=True, descend_into=(Block, Disjunct))
         elif target.ctype in TYPES:
             datas = target.values() if target.parent_component() is target else [target]
             yield from (d for d in datas if target.ctype is Expression or d.active)

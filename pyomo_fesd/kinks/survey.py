@@ -3,6 +3,7 @@
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import Integral
+from pyomo.gdp import Disjunct
 
 from pyomo_fesd.kinks.rewriting import read
 from pyomo_fesd.kinks.sources import expressions
@@ -40,7 +41,8 @@ class Survey:
             if source not in self.matches:
                 readings = [read(e, self.chooser(source)) for e in expressions(source)]
                 self.matches[source] = [m for matches, _ in readings for m in matches]
-                uses[source] = [] if self._excluded(source) else [u for _, named in readings for u in named]
+                stays = self._excluded(source) or _in_disjunct(source)
+                uses[source] = [] if stays else [u for _, named in readings for u in named]
                 waiting.extend(e for e, _ in reversed(uses[source]))
         return uses
 
@@ -52,6 +54,8 @@ class Survey:
         """Why an absolute value is left alone; None if it is replaced."""
         if self._excluded(source) or self._excludes_variable(match.z):
             return "excluded"
+        if _in_disjunct(source):
+            return "inside a Disjunct: apply fesd.dcs first"
         if isinstance(source.parent_component(), Integral):
             return "inside an Integral, which is not over time (give the integrand an Expression over time)"
         if match.eps > self._largest_eps:
@@ -70,6 +74,14 @@ class Survey:
 
     def _excludes_variable(self, z):
         return bool(self._exclude) and any(map(self._excluded, identify_variables(z, include_fixed=True)))
+
+
+def _in_disjunct(source):
+    """Whether a source stands in a Disjunct, where a condition would have no meaning."""
+    block = source.parent_block()
+    while block is not None and block.ctype is not Disjunct:
+        block = block.parent_block()
+    return block is not None
 
 
 def _closure(uses):

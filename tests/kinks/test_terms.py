@@ -28,7 +28,7 @@ def model():
         (lambda m: m.y - 2 * (m.p * m.x) + 2 * m.p * m.x, 'y'),
         (lambda m: (-m.x) / m.p + m.x / m.p, '0'),
         (lambda m: m.x * m.y - m.y * m.x, 'x*y - (y*x)'),  # structure, not algebra
-        (lambda m: -(-m.x), 'x'),
+        (lambda m: 0 - (-m.x), 'x'),
         (lambda m: m.x - m.x, '0'),
         (lambda m: 7, '7'),
     ],
@@ -59,7 +59,9 @@ def test_terms_of_terms():
 def linear(draw, depth=3):
     """A function from a model to an expression of sums, differences, multiples and quotients."""
     if depth == 0:
-        return draw(st.sampled_from([lambda m: m.x, lambda m: m.y, lambda m: m.p, lambda m: m.x * m.y, lambda m: m.e, lambda m: 3.0]))
+        return draw(
+            st.sampled_from([lambda m: m.x, lambda m: m.y, lambda m: m.p, lambda m: m.x * m.y, lambda m: m.e, lambda m: 3.0])
+        )
     a, b = draw(linear(depth=depth - 1)), draw(linear(depth=depth - 1))
     c = draw(st.sampled_from([-2.0, 0.5, 1.0, 4.0]))
     kinds = [lambda m: a(m) + b(m), lambda m: a(m) - b(m), lambda m: c * a(m), lambda m: a(m) / c, lambda m: -a(m)]
