@@ -9,7 +9,7 @@ from pyomo.core.expr import numeric_expr as ne
 from pyomo.core.expr.visitor import StreamBasedExpressionVisitor
 
 from pyomo_fesd.kinks.patterns import guards, match
-from pyomo_fesd.kinks.terms import Terms, linear_parts
+from pyomo_fesd.kinks.terms import Terms
 
 #: Types that are not entered; ``Expr_if`` jumps, and its condition is no number.
 CLOSED = {*native_types, ne.Expr_ifExpression}
@@ -112,11 +112,5 @@ class _Rewriter(_Walker):
             return self._absolute(Terms(results[0]))
         if not any(isinstance(r, Terms) for r in results):
             return node
-        parts = linear_parts(node, results)
-        if parts is None:
-            args = [r.expression() if isinstance(r, Terms) else r for r in results]
-            return Terms(node.create_node_with_local_data(args))
-        terms = Terms()
-        for factor, part in parts:
-            terms.add(part, factor)
-        return terms
+        args = [r.expression() if isinstance(r, Terms) else r for r in results]
+        return Terms(node.create_node_with_local_data(args))

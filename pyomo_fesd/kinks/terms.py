@@ -39,7 +39,7 @@ def _quotient(args):
 
 def _factor(e):
     """The number, and the rest, of an expression that is a multiple: Pyomo writes x - p*y as x + (-p)*y."""
-    parts = linear_parts(e, e.args) if e.__class__ in LINEAR else ()
+    parts = linear_parts(e)
     return parts[0] if parts and len(parts) == 1 else (1, e)
 
 
@@ -58,10 +58,10 @@ LINEAR = {
 }
 
 
-def linear_parts(node, args):
-    """``[(number, argument)]`` of which ``node`` with the arguments ``args`` is the sum; None if it is no such sum."""
-    rule = LINEAR.get(node.__class__)
-    return None if rule is None else rule(args)
+def linear_parts(e):
+    """``[(number, expression)]`` of which ``e`` is the sum; None if it is no sum or multiple."""
+    rule = LINEAR.get(e.__class__)
+    return None if rule is None else rule(e.args)
 
 
 def structure(expr):
@@ -83,7 +83,7 @@ class Terms:
         waiting = [(factor, expr)]
         while waiting:
             c, e = waiting.pop()
-            parts = _parts(e)
+            parts = e.parts() if e.__class__ is Terms else linear_parts(e)
             if parts is not None:
                 waiting.extend((c * f, a) for f, a in reversed(parts))
             elif e.__class__ in native_types:
@@ -110,9 +110,3 @@ class Terms:
     def expression(self):
         """As a Pyomo expression, or a number."""
         return sum(c * e for c, e in self.parts())
-
-
-def _parts(e):
-    if e.__class__ is Terms:
-        return e.parts()
-    return linear_parts(e, e.args) if e.__class__ in LINEAR else None

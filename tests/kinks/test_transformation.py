@@ -58,7 +58,7 @@ def decay(expression):
         (lambda m: smooth_max(m.x, 0), 's[1]'),
         (lambda m: smooth_min(smooth_max(m.x, 0), 1), 's[1] - s[2]'),
         (lambda m: (m.x + m.y + pyo.sqrt((m.x - m.y) ** 2 + 1e-8)) / 2, 'y + s[1]'),
-        (lambda m: 3 * smooth_max(m.x, m.y) - m.y, '2.0*y + 3.0*s[1]'),
+        (lambda m: 3 * smooth_max(m.x, m.y) - m.y, '2*y + 3*s[1]'),
         (lambda m: m.y * smooth_max(m.x, 0), 'y*s[1]'),
         (lambda m: pyo.exp(smooth_max(m.x, 0) + m.x), 'exp(s[1] + x)'),
         (lambda m: smooth_max(m.x, 0) ** 2, 's[1]**2'),
