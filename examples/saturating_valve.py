@@ -9,7 +9,6 @@ boundaries find the three times.
 Reference: the same equations between events, by scipy.
 """
 
-import numpy as np
 import pyomo.dae as dae
 import pyomo.environ as pyo
 from scipy.integrate import solve_ivp

@@ -5,7 +5,7 @@ Exact but for rounding: only numbers are multiplied and added; what is not linea
 
 from pyomo.common.numeric_types import native_types
 from pyomo.core.expr import numeric_expr as ne
-from pyomo.core.expr.compare import convert_expression_to_prefix_notation
+from pyomo.core.expr.compare import PrefixVisitor
 
 
 def _sum(args):
@@ -64,9 +64,19 @@ def linear_parts(e):
     return None if rule is None else rule(e.args)
 
 
+class _Prefix(PrefixVisitor):
+    """Prefix notation in which a named Expression stands for itself: what it holds may change."""
+
+    def enterNode(self, node):
+        if hasattr(node, 'is_named_expression_type') and node.is_named_expression_type():
+            self._result.append(node)
+            return (), None
+        return super().enterNode(node)
+
+
 def structure(expr):
     """Equal for expressions that are built alike from the same components and numbers."""
-    prefix = convert_expression_to_prefix_notation(expr)
+    prefix = _Prefix().walk_expression(expr)
     return tuple(p if isinstance(p, tuple) or p.__class__ in native_types else ('id', id(p)) for p in prefix)
 
 

@@ -44,6 +44,14 @@ def test_equal_structure_is_that_of_the_same_components():
     assert structure(m.x**2) != structure(m.y**2)
 
 
+def test_a_named_expression_is_itself_whatever_it_holds():
+    m = model()
+    m.same = pyo.Expression(expr=m.x**2)
+    terms = Terms(m.e - m.same)
+    m.same.set_value(m.y)
+    assert len(terms.parts()) == 2 and pyo.value(terms.expression()) == pytest.approx(0.09 + 1.7)
+
+
 def test_the_key_does_not_depend_on_the_order_and_knows_the_sign():
     m = model()
     a, b = Terms(m.x - 2 * m.y + 1), Terms(1 - m.y * 2 + m.x)
