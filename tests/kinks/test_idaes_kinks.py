@@ -1,7 +1,9 @@
 """Smoothed functions of IDAES made exact (needs the extra [idaes])."""
 
 import warnings
+from math import exp
 
+import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 from pyomo.util.calc_var_value import calculate_variable_from_constraint
@@ -11,7 +13,7 @@ with warnings.catch_warnings():
     warnings.simplefilter('ignore')  # marks of IDAES' own tests that are not registered here
     from idaes.core.util.tests.test_pid_initialization import make_model
 
-from idaes.core import FlowsheetBlock  # noqa: E402
+from idaes.core import FlowsheetBlock, ProcessBlockData, declare_process_block_class  # noqa: E402
 from idaes.core.util import math  # noqa: E402
 from idaes.models.properties.modular_properties.base.generic_property import GenericParameterBlock  # noqa: E402
 from idaes.models.properties.modular_properties.examples.BT_ideal import configuration  # noqa: E402
@@ -131,6 +133,33 @@ def test_on_movable_elements_saturation_begins_at_an_element_boundary(smooth):
     assert asked[begins] == pytest.approx(LIMIT, abs=1e-8)
     assert (asked[begins:].iloc[1:] < LIMIT).all() and (flow[begins:] - LIMIT).abs().max() < 1e-9
     assert (flow[:begins].iloc[:-1] - asked[:begins].iloc[:-1]).abs().max() < 1e-9
+
+
+# A unit model of one's own
+
+
+@declare_process_block_class('Brake')
+class BrakeData(ProcessBlockData):
+    """Its force is twice the part of x above 1."""
+
+    def build(self):
+        super().build()
+        fs = self.parent_block()
+        self.force = pyo.Expression(expr=2 * pyomo_fesd.positive_part(self, fs.x[self.index()] - 1))
+
+
+def test_a_function_in_a_process_block_over_time():
+    m = pyo.ConcreteModel()
+    m.fs = FlowsheetBlock(dynamic=True, time_set=[0, 2], time_units=pyo.units.s)
+    m.fs.x = pyo.Var(m.fs.time, initialize=0)
+    m.fs.dx = dae.DerivativeVar(m.fs.x, wrt=m.fs.time)
+    m.fs.x[0].fix(0)
+    m.fs.brake = Brake(m.fs.time)  # noqa: F821  IDAES makes the class
+    m.fs.ode = pyo.Constraint(m.fs.time, rule=lambda fs, t: fs.dx[t] == 1 - fs.brake[t].force)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m.fs, wrt=m.fs.time, nfe=12, ncp=3)
+    certified(m)
+    starts = pyomo_fesd.element_lengths(m, m.fs.time)['start']
+    assert (starts - 1).abs().min() < 1e-9 and m.fs.x[2].value == pytest.approx(1 + (1 - exp(-2)) / 2, abs=2e-6)
 
 
 # Steady units
