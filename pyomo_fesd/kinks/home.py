@@ -20,7 +20,7 @@ class _Home(AutoSlots.Mixin):
     asked : int
         on a user's block: how many kinks were asked for
     source : ComponentMap
-        on a generated block: the ConstraintData, ObjectiveData or ExpressionData of each pair
+        on a generated block: what each pair was made for, such as a ConstraintData
     """
 
     __slots__ = ('asked', 'source')
@@ -96,7 +96,7 @@ def add_to_block(block, number, z):
 
 
 def add_for_source(source, number, z):
-    """s = max(0, z) for the kink ``number`` of a constraint, objective or named Expression, in a block beside it."""
+    """s = max(0, z) for the kink ``number`` of a source (a ConstraintData, ...), in a block beside it."""
     home = _home(source)
     home.numbers.add(number)
     s = kink.add(home, (*_index(source), number), z)

@@ -11,7 +11,7 @@ class Summary:
     Attributes
     ----------
     changed : Counter
-        constraints, objectives and named Expressions that were changed
+        constraints, objectives, conditions and named Expressions that were changed
     replaced : int
         absolute values in them
     pairs : int

@@ -14,7 +14,7 @@ class Survey:
 
     Parameters
     ----------
-    sources : iterable of ConstraintData, ObjectiveData, ExpressionData
+    sources : iterable of ConstraintData, ObjectiveData, ComplementarityData, ExpressionData
     exclude : list of components
     largest_eps : float
     protective : bool

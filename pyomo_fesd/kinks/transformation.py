@@ -33,11 +33,11 @@ class SmoothToComplementarity(Transformation):
     """Write every absolute value, exact or smoothed, as |z| = 2 s - z, 0 <= s perp s - z >= 0 (theory, eq. 8).
 
     Read as |z| are ``abs(z)`` and ``sqrt(z**2 + c)`` with a small constant c = eps**2, also written as power or product, in active
-    Constraints and Objectives and the named Expressions that they use.  With |z| come max(a, b) = (a + b + |a - b|)/2 and
-    what IDAES builds from it; like terms are collected, so it comes out as b + s.  One variable and one pair for each
-    different z of a constraint; nothing where declared bounds tell the sign of z.
+    Constraints, Objectives and Complementarities and the named Expressions that they use.  With |z| come
+    max(a, b) = (a + b + |a - b|)/2 and what IDAES builds from it; like terms are collected, so it comes out as b + s.  One
+    variable and one pair for each different z of a constraint; nothing where declared bounds tell the sign of z.
 
-    Constraints, Objectives and Expressions are changed in place: same names, same indices, same active state.  There is no way
+    All these are changed in place: same names, same indices, same active state.  There is no way
     back; ``create_using`` leaves the original as it is.  A second application changes nothing.
 
     Works before and after discretisation, and on models without time.  On a model that is not discretised yet, the later
@@ -58,7 +58,8 @@ class SmoothToComplementarity(Transformation):
     CONFIG.declare(
         'targets',
         ConfigValue(
-            domain=target_list, description="Blocks, Constraints, Objectives or Expressions to look at; default: the whole model"
+            domain=target_list,
+            description="Blocks, Constraints, Objectives, Complementarities or Expressions to look at; default: the whole model",
         ),
     )
     CONFIG.declare('wrt', ConfigValue(description="the ContinuousSet whose expansion is followed; default: every one of the model"))
@@ -67,7 +68,7 @@ class SmoothToComplementarity(Transformation):
         ConfigValue(
             default=[],
             domain=_components,
-            description="what is left alone: Constraints, Objectives, Expressions, Blocks, or Vars that occur in z",
+            description="what is left alone: any of these, or Vars that occur in z",
         ),
     )
     CONFIG.declare(
@@ -106,7 +107,7 @@ class SmoothToComplementarity(Transformation):
         return summary
 
     def get_src_constraint(self, condition):
-        """The ConstraintData (or ObjectiveData, or ExpressionData) that a generated complementarity condition was made for."""
+        """The ConstraintData (or the data of another type) that a generated complementarity condition was made for."""
         return source_of(condition)
 
 

@@ -4,11 +4,12 @@ import pyomo.environ as pyo
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd.complementarity import read
+from pyomo_fesd.marks import is_generated
 
 
 def settle(model):
     """Give every generated s the value max(0, z), in the order in which the kinks were made."""
-    for condition in model.component_data_objects(Complementarity, descend_into=True):
+    for condition in filter(is_generated, conditions(model)):
         s, gap = read(condition)
         s.value = 0.0
         s.value = max(0.0, -pyo.value(gap))

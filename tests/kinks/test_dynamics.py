@@ -10,8 +10,8 @@ import pytest
 import saturating_valve
 
 import pyomo_fesd
-from pyomo_fesd import absolute, clip, maximum, minimum, positive_part
-from tests.kinks.support import exact, smooth_abs, smooth_max, smooth_min
+from pyomo_fesd import FesdError, absolute, clip, maximum, minimum, positive_part
+from tests.kinks.support import conditions, exact, smooth_abs, smooth_max, smooth_min
 
 RADAU, GAUSS = 'LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE'
 
@@ -94,6 +94,26 @@ def test_the_transformed_copy_is_solved_and_the_original_stays_smooth():
     new = pyo.TransformationFactory('fesd.smooth_to_complementarity').create_using(m)
     assert boundary(solved(new, nfe=12, ncp=3), 1) < 1e-9
     assert len(m.t) == 2 and '**0.5' in str(m.ode[0].expr)
+
+
+def test_a_clone_expands_by_its_own_rule():
+    m = braked('function')
+    clone = m.clone()
+    assert boundary(solved(clone, nfe=12, ncp=3), 1) < 1e-9
+    assert len(m.t) == 2 and boundary(solved(m, nfe=12, ncp=3), 1) < 1e-9
+
+
+def test_a_clone_whose_rule_means_the_original_is_refused_and_left_as_it_was():
+    m = state()
+
+    @m.Block(m.t)
+    def brake(b, t):
+        b.ode = pyo.Constraint(expr=m.dx[t] == 1 - 2 * maximum(b, 0, m.x[t] - 1))
+
+    clone = m.clone()
+    with pytest.raises(FesdError, match='if this model is a clone'):
+        pyo.TransformationFactory('fesd.finite_elements').apply_to(clone, nfe=4, ncp=2)
+    assert len(clone.t) == len(clone.brake) == len(conditions(clone)) == 2
 
 
 @pytest.mark.parametrize('scheme, tolerance', [(RADAU, 3e-5), (GAUSS, 1e-7)])

@@ -5,7 +5,7 @@ import logging
 import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
-from pyomo.mpec import Complementarity
+from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
@@ -203,6 +203,30 @@ def test_objectives_and_both_sides_and_limits(m):
     assert [pyo.value(e) for e in (m.cost, m.c.body, m.d.body)] == [4.5, 0.5 - 2, 2.5]
 
 
+def test_both_sides_of_a_condition(m):
+    m.pair = Complementarity(expr=complements(abs(m.x) - 1 >= 0, smooth_max(m.y, 0)))
+    summary = exact(m)
+    assert dict(summary.changed) == {'pair': 1} and summary.pairs == 2
+    settle(m)
+    assert [pyo.value(side) for side in (m.pair._args[0].args[1], m.pair._args[1])] == [-0.5, 0.0]
+
+
+def test_arguments_of_the_functions_with_kinks_of_their_own(m):
+    row(m, pyomo_fesd.maximum(m, abs(m.x), smooth_max(m.y, 1)))
+    # |x| stands in the constraint and in the condition, each has its own
+    assert exact(m).pairs == 3 and exact(m).replaced == 0
+    m.x.value = -4.0
+    for _ in range(2):  # the outer kink was made first, and its value needs that of the inner ones
+        settle(m)
+    assert pyo.value(m.c.expr.args[1]) == 4
+
+
+def test_an_empty_condition_is_passed_over(m):
+    m.pair = Complementarity([1])
+    m.pair[1]
+    assert exact(m).replaced == 0
+
+
 def test_a_named_expression_is_changed_once_for_all_that_use_it(m):
     m.e = pyo.Expression(expr=smooth_max(m.x, m.y))
     row(m, m.e * m.x)
@@ -240,7 +264,7 @@ def test_targets(m, target, pairs):
 def test_unsuitable_targets_are_refused(m):
     row(m, abs(m.x))
     other = m.clone()
-    with pytest.raises(FesdError, match='must be a Block, Constraint, Objective or Expression, not a Var'):
+    with pytest.raises(FesdError, match='must be a Block, Constraint, Objective, Complementarity or Expression, not a Var'):
         exact(m, targets=[m.x])
     with pytest.raises(FesdError, match='another model'):
         exact(m, targets=[m.c, other.c])
