@@ -8,6 +8,8 @@ import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 import saturating_valve
+from pyomo.gdp import Disjunction
+from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
 from pyomo_fesd import FesdError, absolute, clip, maximum, minimum, positive_part
@@ -192,10 +194,39 @@ def test_clip_and_its_smoothed_form_give_the_same():
         assert m.x[4].value == pytest.approx(5 / 6 + (4 - second) / 4, abs=1e-7)
 
 
+def test_an_optimal_control_with_an_absolute_value_in_its_integral():
+    """min int |x| + u**2/20 with u held on [0, 1] and [1, 2], x(0) = 1: u = -1, 0 and the cost 1/2 + 1/20."""
+    m = state(2.0, 1.0, points=[1])
+    m.u = pyo.Var(m.t, bounds=(-2, 2), initialize=0)
+    m.ode = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == m.u[t])
+    m.loss = pyo.Expression(m.t, rule=lambda m, t: abs(m.x[t]))
+    m.total = dae.Integral(m.t, rule=lambda m, t: m.loss[t] + m.u[t] ** 2 / 20)
+    m.cost = pyo.Objective(expr=m.total)
+    exact(m)
+    solved(m, nfe=12, ncp=2, piecewise_constant=[m.u])
+    assert [pyo.value(m.cost), m.u[1].value, m.u[2].value] == pytest.approx([0.55, -1, 0], abs=1e-7)
+
+
+def test_a_kink_inside_a_mode_after_fesd_dcs():
+    """x' = 1 below 0, x' = 4/5 - max(0, x - 1/2) above, from -1: switch at 1, kink at 1 + 5/8."""
+    m = state(3.0, -1.0)
+    m.side = Disjunction(
+        m.t,
+        rule=lambda m, t: [
+            [m.x[t] <= 0, m.dx[t] == 1],
+            [m.x[t] >= 0, m.dx[t] == 0.8 - smooth_max(m.x[t] - 0.5, 0)],
+        ],
+    )
+    pyo.TransformationFactory('fesd.dcs').apply_to(m)
+    exact(m)
+    solved(m, nfe=24, ncp=3)
+    assert [s.time for s in pyomo_fesd.switches(m)] == [pytest.approx(1, abs=1e-9)]
+    assert boundary(m, 1.625) < 1e-9
+    assert m.x[3].value == pytest.approx(0.5 + 0.8 * (1 - exp(-1.375)), abs=1e-8)
+
+
 def test_sizes_beside_the_larger_formulations():
     """A kink costs 1 variable, 0 equations, 1 pair at a time; p - q = z one more of the first two; a Disjunction more still."""
-    from pyomo.gdp import Disjunction
-    from pyomo.mpec import Complementarity, complements
 
     def split(m, t):
         return m.x[t] - 1
