@@ -176,7 +176,11 @@ def switches(model, wrt=None):
 
 def _active(modes, element):
     """The mode with a positive multiplier inside an element; several slide; None where nothing tells."""
-    on = [mode for mode, weights in modes.items() if any(t in weights and value(weights[t]) > CLEAR for t in element.points)]
+    on = [
+        mode
+        for mode, weights in modes.items()
+        if any(t in weights and value(weights[t]) > CLEAR for t in element.points)
+    ]
     if not on:
         return None
     return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on)

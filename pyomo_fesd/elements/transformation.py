@@ -65,7 +65,9 @@ class FiniteElements(Transformation):
 
     CONFIG = ConfigDict('fesd.finite_elements')
     CONFIG.declare('wrt', ConfigValue(description="the ContinuousSet of time; may be left out if there is only one"))
-    CONFIG.declare('nfe', ConfigValue(default=10, domain=PositiveInt, description="number of finite elements, all stages together"))
+    CONFIG.declare(
+        'nfe', ConfigValue(default=10, domain=PositiveInt, description="number of finite elements, all stages together")
+    )
     CONFIG.declare('ncp', ConfigValue(default=3, domain=PositiveInt, description="collocation points in each element (K)"))
     CONFIG.declare(
         'scheme',
