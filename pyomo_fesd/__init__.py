@@ -1,6 +1,6 @@
 """pyomo_fesd: hybrid dynamic systems in Pyomo, solved exactly at their switches.
 
-Importing this registers ``fesd.dcs``, ``fesd.finite_elements`` and ``mpec_hybrid`` with Pyomo.
+Importing this registers ``fesd.dcs``, ``fesd.smooth_to_complementarity``, ``fesd.finite_elements`` and ``mpec_hybrid`` with Pyomo.
 """
 
 import pyomo.environ  # noqa: F401  registers Pyomo's own plug-ins first
@@ -8,6 +8,8 @@ import pyomo.environ  # noqa: F401  registers Pyomo's own plug-ins first
 from pyomo_fesd.dcs import transformation as _dcs  # noqa: F401
 from pyomo_fesd.elements import transformation as _elements  # noqa: F401
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.kinks import transformation as _kinks  # noqa: F401
+from pyomo_fesd.kinks.functions import absolute, clip, maximum, minimum, positive_part
 from pyomo_fesd.march.simulate import simulate
 from pyomo_fesd.plot import plot
 from pyomo_fesd.report import report
@@ -18,10 +20,15 @@ from pyomo_fesd.trajectory import element_lengths, physical_time, switches, traj
 __version__ = '0.1.0'
 __all__ = [
     'FesdError',
+    'absolute',
     'certify',
+    'clip',
     'element_lengths',
+    'maximum',
+    'minimum',
     'physical_time',
     'plot',
+    'positive_part',
     'report',
     'simulate',
     'state_jump',
