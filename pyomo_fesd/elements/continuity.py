@@ -3,7 +3,10 @@
 Cross complementarity lets a side that is continuous enter with its value at the left boundary of an element (theory, eq. 11),
 so a switch cannot hide between two elements.  Continuous are differential states; what ``fesd.dcs`` and the kinks have marked,
 where the quantity that switches is continuous itself; algebraic variables that equations tie to continuous ones; and what the
-user names with the keyword ``continuous``.  Held controls are continuous inside a control stage and jump at its boundaries.
+user names with the keyword ``continuous``.  Held controls and fixed inputs are continuous inside a control stage and may jump at
+its boundaries.
+
+Only the equations of the times that are asked about are read, in general those of one time.
 """
 
 from dataclasses import dataclass
@@ -22,21 +25,24 @@ from pyomo_fesd.timeindex import DISCRETISATION, derivatives
 
 @dataclass(frozen=True)
 class Continuity:
-    """What is continuous, for components over time or their data at the first inner time.
+    """What is continuous, for components over time or their data at the times that were asked about.
 
     Attributes
     ----------
     rules : ComponentMap Var -> Constraint or Complementarity
         what ties each marked variable to the states
-    inside : ComponentSet
+    inside : Known
         continuous inside every control stage
-    across : ComponentSet
+    across : Known
         continuous at the boundaries of control stages too
+    equations : Equations or None
+        the algebraic equations, where they were read
     """
 
     rules: ComponentMap
-    inside: ComponentSet
-    across: ComponentSet
+    inside: object
+    across: object
+    equations: object
 
     def holds(self, expr):
         """Whether ``expr`` is a function of variables that are continuous inside every stage."""
@@ -48,87 +54,159 @@ class Continuity:
 
     def rule(self, expr):
         """The Constraint that ties a marked variable to the states; None for any other side."""
-        rule = self.rules.get(expr.parent_component()) if expr.is_variable_type() else None
+        rule = _rule_of(expr, self.rules) if expr.is_variable_type() else None
         return rule if rule is not None and rule.ctype is Constraint else None
+
+    def curved(self, expr):
+        """Whether ``expr``, or an equation that its variables follow from, is nonlinear."""
+        return any(e.polynomial_degree() not in (0, 1) for e in self.equations.behind(expr, self.rules, self.inside))
+
+    def add(self, variable, rule, expr):
+        """Let a generated ``variable`` be as continuous as ``expr``, to which the Constraint ``rule`` ties it."""
+        for known in (self.inside, self.across):
+            if _all_in(expr, known):
+                known.given.add(variable)
+        self.rules[variable] = rule
+
+
+class Known:
+    """Variables that are continuous: components or data.
+
+    Attributes
+    ----------
+    given : ComponentSet
+        by themselves
+    tied : ComponentSet
+        by equations
+    constant : callable VarData -> bool
+        which others are, because they are fixed
+    """
+
+    def __init__(self, constant, *given):
+        self.constant = constant
+        self.given = ComponentSet(v for some in given for v in some)
+        self.tied = ComponentSet()
+
+    def __contains__(self, v):
+        component = v.parent_component()
+        return v in self.given or component in self.given or v in self.tied or component in self.tied or self.constant(v)
+
+
+def _rule_of(v, rules):
+    """What a mark on a variable, or on its component, says; None without one."""
+    return rules.get(v, rules.get(v.parent_component()))
 
 
 def _all_in(expr, known):
-    variables = list(identify_variables(expr, include_fixed=True)) if hasattr(expr, 'is_expression_type') else []
-    return bool(variables) and all(_in(v, known) for v in variables)
+    variables = list(identify_variables(expr)) if hasattr(expr, 'is_expression_type') else []
+    return bool(variables) and all(v in known for v in variables)
 
 
-def _in(v, known):
-    return v in known or v.parent_component() in known
+def inner_label(family, wrt):
+    """The first of the times of ``family`` that is not the first of all: where it is asked what is continuous."""
+    return next((t for t in wrt if t in family and t != wrt.first()), None)
 
 
-def read_continuity(model, times, held, told, trace):
+def each(variables):
+    """The components themselves; of a Reference its data, which belong to other components."""
+    return [v for c in variables for v in (c.values() if c.is_reference() else [c])]
+
+
+def read_continuity(model, times, labels, held, told, trace):
     """Find the continuous variables of a discretised model.
 
     Parameters
     ----------
     times : TimeIndex
-    held : ComponentSet of Var
+    labels : set of float
+        the times to look at
+    held : list of Var
         controls that are constant on each stage
     told : list of Var
         variables of which the user says that they are continuous
     trace : bool
-        whether algebraic variables matter: they do not where ``fesd.dcs`` wrote every condition
+        whether algebraic variables matter in any case: they do not where ``fesd.dcs`` wrote every condition and nothing is held
     """
     rules = ComponentMap(marks.marked(model, marks.CONTINUOUS))
-    equations = _Equations(model, times) if trace or any(r.ctype is Complementarity for r in rules.values()) else None
-    start = ComponentSet(d.get_state_var() for d in derivatives(model, times.wrt))
-    start.update(told)
-    across = _closure(start, rules, held, equations)
-    start.update(held)
-    return Continuity(rules, _closure(start, rules, (), equations) if held else across, across)
+    trace = trace or (rules and held) or any(r.ctype is Complementarity for r in rules.values())
+    equations = Equations(model, times, labels) if trace else None
+    start, held = [*(d.get_state_var() for d in derivatives(model, times.wrt)), *each(told)], each(held)
+    inside = _closure(Known(_is_fixed, start, held), rules, equations)
+
+    def keeps_value(v):
+        among = v.parent_component()
+        return _is_fixed(v) and (
+            times.time(v) is None or (among.is_indexed() and all(u.fixed and u.value == v.value for u in among.values()))
+        )
+
+    across = _across(Known(keeps_value, start), rules, held, inside, equations) if held or trace else inside
+    return Continuity(rules, inside, across, equations)
 
 
-def _closure(start, rules, held, equations):
-    """``start`` and all that follows from it; nothing that contains a held control does."""
-    known = ComponentSet(start)
-    known.update(v for v, rule in rules.items() if rule.ctype is Constraint and not _mentions(rule, held))
+def _is_fixed(v):
+    return not v.is_indexed() and v.fixed
+
+
+def _across(start, rules, held, inside, equations):
+    """What is continuous without held controls, and without marks on what follows from them."""
+    held, kept = ComponentSet(held), ComponentMap(rules.items())
+    while True:
+        across = _closure(Known(start.constant, start.given), kept, equations)
+
+        def jumps(v):
+            return v in held or v.parent_component() in held or (v in inside and v not in across)
+
+        late = [v for v, rule in kept.items() if rule.ctype is Constraint and equations.mention(rule, jumps)]
+        if not late:
+            return across
+        for v in late:
+            del kept[v]
+
+
+def _closure(known, rules, equations):
+    """``known`` and all that follows from it."""
+    known.given.update(v for v, rule in rules.items() if rule.ctype is Constraint)
     if equations is None:
         return known
     kinks = [(v, rule) for v, rule in rules.items() if rule.ctype is Complementarity and equations.here(v)]
     while True:
-        known.update(equations.tied(known))
-        ready = [v for v, rule in kinks if v not in known and all(u is s or _in(u, known) for s, u in equations.kink(v, rule))]
+        known.tied.update(equations.tied(known))
+        ready = [v for v, rule in kinks if v not in known and equations.follows(v, rule, known)]
         if not ready:
             return known
-        known.update(ready)
+        known.given.update(ready)
 
 
-def _mentions(rule, components):
-    """Whether a Constraint over time contains variables of ``components``."""
-    data = next(iter(rule.values()), None) if components else None
-    return data is not None and any(v.parent_component() in components for v in identify_variables(data.body))
+class Equations:
+    """The algebraic equations of a few times, with the variables that they contain."""
 
-
-class _Equations:
-    """The algebraic equations of one inner time, as lists of the variables that they contain."""
-
-    def __init__(self, model, times):
-        self._times = times
-        self._label = list(times.wrt)[1]
+    def __init__(self, model, times, labels):
+        self._times, self._labels = times, labels
         constraints = model.component_data_objects(Constraint, active=True, descend_into=Block)
         self._rows = [
-            [v for v in identify_variables(c.body) if times.time(v) is not None]
+            (c.body, [v for v in identify_variables(c.body) if times.time(v) is not None])
             for c in constraints
-            if c.equality and times.time(c) == self._label and not c.parent_component().local_name.endswith(DISCRETISATION)
+            if c.equality and times.time(c) in labels and not c.parent_component().local_name.endswith(DISCRETISATION)
         ]
 
+    def _data(self, component):
+        return (d for d in component.values() if self._times.time(d) in self._labels)
+
     def here(self, component):
-        """Whether a marked component has data at this time."""
+        """Whether a component has data at these times."""
         return any(True for _ in self._data(component))
 
-    def _data(self, component):
-        return (v for v in component.values() if self._times.time(v) == self._label)
+    def mention(self, rule, test):
+        """Whether a Constraint contains a variable for which ``test`` is true."""
+        return any(test(v) for c in self._data(rule) for v in identify_variables(c.body))
 
-    def kink(self, component, condition):
-        """``(s, variable)`` for every variable of the conditions that define s = max(0, z) at this time."""
-        for s in self._data(component):
-            for side in condition[s.index()]._args:
-                yield from ((s, v) for v in identify_variables(side, include_fixed=True))
+    def follows(self, s, condition, known):
+        """Whether ``condition`` makes s = max(0, z) of a known z."""
+        return all(v is own or v in known for own in self._data(s) for v in self._kink(own, condition))
+
+    @staticmethod
+    def _kink(own, condition):
+        return [v for side in condition[own.index()]._args for v in identify_variables(side)]
 
     def tied(self, known):
         """Variables that equations tie to known ones.
@@ -136,22 +214,48 @@ class _Equations:
         They are the unknowns of the equations that are not under-determined (Dulmage and Mendelsohn): those that no alternating
         path connects with an unmatched unknown.
         """
-        rows = [[v for v in row if not _in(v, known)] for row in self._rows]
-        columns = ComponentMap()
-        for row in rows:
-            for v in row:
-                columns.setdefault(v, len(columns))
-        places = [(i, columns[v]) for i, row in enumerate(rows) for v in row]
+        columns, incidence = self._incidence(known)
+        if incidence is None:
+            return []
+        loose = _under_determined(incidence, maximum_bipartite_matching(incidence, perm_type='row'))
+        return [v for v, j in columns.items() if j not in loose]
+
+    def _incidence(self, known):
+        """Unknowns with their numbers, and which equation contains which."""
+        columns, places = ComponentMap(), []
+        for i, (_, variables) in enumerate(self._rows):
+            places += [(i, columns.setdefault(v, len(columns))) for v in variables if v not in known]
         if not places:
-            return ComponentSet()
-        incidence = csr_matrix((np.ones(len(places)), tuple(zip(*places))), shape=(len(rows), len(columns)))
-        loose = _under_determined(incidence)
-        return ComponentSet(v for v, j in columns.items() if j not in loose)
+            return columns, None
+        return columns, csr_matrix((np.ones(len(places)), tuple(zip(*places))), shape=(len(self._rows), len(columns)))
+
+    def behind(self, expr, rules, known):
+        """``expr`` and the expressions that its variables follow from, down to what is continuous by itself."""
+        columns, incidence = self._incidence(Known(_is_fixed, known.given))
+        row_of = maximum_bipartite_matching(incidence, perm_type='row') if columns else []
+        found, seen, waiting = [expr], ComponentSet(), list(identify_variables(expr))
+        while waiting:
+            v = waiting.pop()
+            if v in seen:
+                continue
+            seen.add(v)
+            for source in self._sources(v, rules, columns, row_of):
+                found.append(source)
+                waiting += identify_variables(source)
+        return found
+
+    def _sources(self, v, rules, columns, row_of):
+        """What defines one variable: a mark's rule, or the equation that is matched with it."""
+        rule = _rule_of(v, rules)
+        if rule is not None and rule.ctype is Complementarity:
+            return rule[v.index()]._args
+        if rule is not None:
+            return [c.body for c in self._data(rule) if any(u is v for u in identify_variables(c.body))]
+        return [self._rows[row_of[columns[v]]][0]] if v in columns and row_of[columns[v]] >= 0 else []
 
 
-def _under_determined(incidence):
-    """Columns that an alternating path connects with an unmatched column."""
-    row_of = maximum_bipartite_matching(incidence, perm_type='row')  # of each column, -1 if unmatched
+def _under_determined(incidence, row_of):
+    """Columns that an alternating path connects with an unmatched column (``row_of`` is -1 there)."""
     column_of = {i: j for j, i in enumerate(row_of) if i >= 0}
     by_column, loose = incidence.tocsc(), {j for j, i in enumerate(row_of) if i < 0}
     waiting = list(loose)

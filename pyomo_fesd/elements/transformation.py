@@ -7,18 +7,20 @@ from pyomo.gdp import Disjunction
 
 from pyomo_fesd import marks, records
 from pyomo_fesd.elements.controls import check_controls, hold_controls
-from pyomo_fesd.elements.cross import (
-    FORMS,
-    add_cross_complementarity,
-    read_families,
-    sources,
-    warn_gauss_on_curved_surfaces,
-)
+from pyomo_fesd.elements.continuity import inner_label, read_continuity
+from pyomo_fesd.elements.cross import FORMS, add_cross_complementarity, sources
 from pyomo_fesd.elements.equilibration import MODES, add_equilibration
 from pyomo_fesd.elements.expansion import discretise
 from pyomo_fesd.elements.explicit_time import warn_explicit_time
+from pyomo_fesd.elements.families import (
+    conditions_over_time,
+    read_families,
+    refuse_lists_of_times,
+    warn_gauss_on_curved_surfaces,
+)
 from pyomo_fesd.elements.grid import check_resolution, read_grid
 from pyomo_fesd.elements.lengths import add_lengths, check_orders, multiply_derivatives
+from pyomo_fesd.elements.mixed import split_mixed
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
 from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.errors import FesdError
@@ -136,7 +138,11 @@ class FiniteElements(Transformation):
             stages = self._discretise(instance, wrt, config)
             grid = read_grid(wrt, stages)
             check_orders(instance.model(), wrt)
-            families = read_families(instance, wrt, config.piecewise_constant, config.continuous)
+            times = TimeIndex(wrt)
+            pairs, mixed = conditions_over_time(instance, times)
+            continuity = self._continuity(instance, times, [*pairs.values(), *mixed.values()], grid, config)
+            pairs |= split_mixed(mixed, continuity, times)
+            families = read_families(pairs, continuity, times)
             waiting = next(_active_disjunctions(instance, wrt), None)
             if waiting is not None and not families:
                 raise FesdError(
@@ -145,7 +151,7 @@ class FiniteElements(Transformation):
             integrands = [(i, integrand(i)) for i in integrals(instance.model(), wrt)]
             warn_explicit_time(instance, wrt, grid, integrands)
             if not grid.right_is_stage:
-                warn_gauss_on_curved_surfaces(families)
+                warn_gauss_on_curved_surfaces(families, continuity, times)
 
             block = self._block(instance, wrt)
             add_lengths(block, grid, config.length_bounds)
@@ -164,6 +170,7 @@ class FiniteElements(Transformation):
         if wrt in records.records(instance).grids:
             raise FesdError(wrt, "its elements are movable already", "apply fesd.finite_elements once for each ContinuousSet")
         check_controls(config.piecewise_constant, wrt)
+        refuse_lists_of_times(instance, TimeIndex(wrt))
         if discretised(wrt):
             return
         if config.stages is not None:
@@ -178,6 +185,14 @@ class FiniteElements(Transformation):
                 f"take a multiple of {stages}",
             )
         check_resolution(wrt, config.nfe, config.ncp)
+
+    @staticmethod
+    def _continuity(instance, times, families, grid, config):
+        """What is continuous where the families begin, by the equations there if they can matter."""
+        labels = {inner_label(family, times.wrt) for family in families}
+        written = not all(marks.is_generated(condition) for family in families for condition in family.values())
+        trace = written or (bool(families) and not grid.right_is_stage)
+        return read_continuity(instance.model(), times, labels, config.piecewise_constant, config.continuous, trace)
 
     @staticmethod
     def _discretise(instance, wrt, config):

@@ -153,16 +153,6 @@ def test_a_condition_that_is_switched_off_at_some_times_takes_no_part_there():
     assert list(block(m).cross) == [('overflow', 1), ('overflow', 3), ('overflow', 4)]
 
 
-def test_two_bounds_on_one_side_over_time_are_refused():
-    m = weir.build()
-    m.z = pyo.Var(m.t, bounds=(0, 1))
-    m.valve = Complementarity(m.t, rule=lambda m, t: complements(pyo.inequality(0, m.z[t], 1), m.V[t] - 0.5))
-    before = seen(m)
-    with pytest.raises(FesdError, match=r'^valve\[0\]: .*two bounds on one side is not supported yet'):
-        move(m, 3)
-    assert seen(m) == before
-
-
 # Which points take part
 
 
