@@ -10,15 +10,19 @@ from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
-from pyomo_fesd.complementarity import Mixed, read
+from pyomo_fesd.complementarity import Pair, read
 from pyomo_fesd.elements.cross import sources
 from pyomo_fesd.elements.grid import ONE_ELEMENT_SCHEMES, read_grid
+from pyomo_fesd.elements.lengths import duration
+from pyomo_fesd.elements.mixed import parts
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set, strip_time
 
 #: A multiplier nearer than this to 0 (or to 1) counts as off (or on).
 CLEAR = 1e-6
+#: The modes of a condition with two bounds on one side.
+AT_LOWER, BETWEEN, AT_UPPER = 'at lower bound', 'between', 'at upper bound'
 
 
 class Switch(NamedTuple):
@@ -46,7 +50,8 @@ def physical_time(model, wrt=None):
     """Physical time of every label of ``wrt``.
 
     With element lengths h_n a label of element n stands for t_{n,0} + c_r h_n, t_{n,0} the sum of the lengths before
-    (theory, eq. 9 and 10); on an ordinary grid labels are physical time.
+    (theory, eq. 9 and 10), in the time of the plant if the final time or the lengths of the stages are free; on an ordinary
+    grid labels are physical time.
 
     Returns
     -------
@@ -59,7 +64,7 @@ def physical_time(model, wrt=None):
     grid = _grid(wrt)
     time = {wrt.first(): float(wrt.first())}
     for element in grid.elements:
-        left, h = time[element.left], element.length * value(block.r[element.n])
+        left, h = time[element.left], value(duration(block, element))
         time.update((label, left + c * h) for label, c in zip(element.points, grid.tau))
         time[element.right] = left + h
     return {t: time[t] for t in wrt}
@@ -89,8 +94,9 @@ def trajectory(model, wrt=None):
     """Every variable and named expression over time on physical time.
 
     They are named without their time index (``x``, ``unit.F[a]``); each Disjunction adds the multipliers of its modes
-    (``sgn: below``), 1 where the mode is active, 0 where it is not, between in a sliding mode.  The columns ``element`` and
-    ``label`` tell where a row comes from.
+    (``sgn: below``), 1 where the mode is active, 0 where it is not, between in a sliding mode; each condition with two bounds on
+    one side adds where it stands (``valve: at lower bound``, ``valve: between``, ``valve: at upper bound``) in the same way.  The
+    columns ``element`` and ``label`` tell where a row comes from.
 
     Returns
     -------
@@ -102,10 +108,12 @@ def trajectory(model, wrt=None):
     found = model.component_objects((Var, Expression), descend_into=Block)
     owned = (v for v in found if not v.is_reference() and not marks.is_generated(v))
     families = index.families(data for v in owned for data in v.values())
-    columns = {'label': list(times), 'element': _elements(wrt, times)}
+    elements = _elements(wrt, times)
+    columns = {'label': list(times), 'element': elements}
     for name, values in families.items():
         columns[strip_time(name)] = [_number(values.get(t)) for t in times]
-    for name, modes in _multipliers(model, index).items():
+    inside = {t: n if n and t != wrt.first() else (t,) for t, n in zip(times, elements)}
+    for name, modes in (_multipliers(model, index) | dict(_positions(model, wrt, index, inside))).items():
         for mode, weights in modes.items():
             columns[f'{name}: {mode}'] = [_number(weights.get(t)) for t in times]
     return pd.DataFrame(columns, index=pd.Index(times.values(), name='time'))
@@ -176,18 +184,14 @@ def switches(model, wrt=None):
 
 def _active(modes, element):
     """The mode with a positive multiplier inside an element; several slide; None where nothing tells."""
-    on = [
-        mode
-        for mode, weights in modes.items()
-        if any(t in weights and value(weights[t]) > CLEAR for t in element.points)
-    ]
+    on = [mode for mode, weights in modes.items() if any(t in weights and value(weights[t]) > CLEAR for t in element.points)]
     if not on:
         return None
     return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on)
 
 
 def _conditions(model, wrt, index):
-    """Hand-written complementarities as systems of two modes, named by the side that is positive.
+    """Hand-written complementarities as systems of modes: a pair by the side that is positive, a mixed one by its bounds.
 
     Those that ``fesd.finite_elements`` has aggregated are inactive but at the first time; others that are inactive are off.
     """
@@ -195,11 +199,39 @@ def _conditions(model, wrt, index):
     block, found = records(model).grids.get(wrt), {}
     moved = ComponentSet(c for conditions in sources(block).values() for c in conditions) if block is not None else ()
     for name, family in index.families(own).items():
-        in_use = any(c.active or c in moved for c in family.values())
-        sides = {t: read(c) for t, c in family.items() if block is not None or c.active}
-        if in_use and not any(isinstance(s, Mixed) for s in sides.values()):
-            found[strip_time(name)] = {
-                'G > 0': {t: pair.G for t, pair in sides.items()},
-                'H > 0': {t: pair.H for t, pair in sides.items()},
-            }
+        if any(c.active or c in moved for c in family.values()):
+            weights = {t: _weights(c) for t, c in family.items() if block is not None or c.active}
+            found[strip_time(name)] = {mode: {t: w[mode] for t, w in weights.items() if mode in w} for mode in _modes(weights)}
     return found
+
+
+def _modes(weights):
+    return dict.fromkeys(mode for w in weights.values() for mode in w)
+
+
+def _weights(condition):
+    """What is positive in each mode of one condition at one time."""
+    read_as = read(condition)
+    if isinstance(read_as, Pair):
+        return {'G > 0': read_as.G, 'H > 0': read_as.H}
+    p, n = parts(condition) or (read_as.F, -read_as.F)
+    return {AT_LOWER: p, BETWEEN: min(_number(read_as.above), _number(read_as.below)), AT_UPPER: n}
+
+
+def _positions(model, wrt, index, elements):
+    """Which of the three modes each mixed condition is in, as shares like those of a Disjunction: 1 where it is."""
+    for name, modes in _conditions(model, wrt, index).items():
+        if BETWEEN in modes:
+            totals = {}
+            for mode, weights in modes.items():
+                for t, w in weights.items():
+                    key = mode, elements[t]
+                    totals[key] = totals.get(key, 0.0) + max(_number(w), 0.0)
+            sums = {n: sum(totals.get((mode, n), 0.0) for mode in modes) for n in elements.values()}
+            yield (
+                name,
+                {
+                    mode: {t: totals[mode, elements[t]] / sums[elements[t]] for t in weights if sums[elements[t]] > 0}
+                    for mode, weights in modes.items()
+                },
+            )

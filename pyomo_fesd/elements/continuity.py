@@ -10,17 +10,19 @@ Only the equations of the times that are asked about are read, in general those 
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, Constraint
+from pyomo.core import Block, Constraint, Var
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from pyomo_fesd import marks
-from pyomo_fesd.timeindex import DISCRETISATION, derivatives
+from pyomo_fesd.errors import FesdError
+from pyomo_fesd.timeindex import DISCRETISATION, derivatives, is_indexed_by
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,21 @@ def each(variables):
     return [v for c in variables for v in (c.values() if c.is_reference() else [c])]
 
 
+def check_told(told, held, wrt):
+    """Refuse what cannot be said to be continuous in time.
+
+    Raises
+    ------
+    FesdError
+        for what is no Var over time, and for controls that are held
+    """
+    for v in told:
+        if getattr(v, 'ctype', None) is not Var or not is_indexed_by(v, wrt):
+            raise FesdError(v, f"continuous: this is no Var indexed by '{wrt.name}'", "give Vars over the ContinuousSet, e.g. m.y")
+        if any(v is u for u in held):
+            raise FesdError(v, "continuous: it is held on each stage, so it jumps", "leave it out of one of the two keywords")
+
+
 def read_continuity(model, times, labels, held, told, trace):
     """Find the continuous variables of a discretised model.
 
@@ -149,18 +166,24 @@ def _is_fixed(v):
 
 def _across(start, rules, held, inside, equations):
     """What is continuous without held controls, and without marks on what follows from them."""
-    held, kept = ComponentSet(held), ComponentMap(rules.items())
+    held, kept = Known(_never, held), ComponentMap(rules.items())
     while True:
         across = _closure(Known(start.constant, start.given), kept, equations)
-
-        def jumps(v):
-            return v in held or v.parent_component() in held or (v in inside and v not in across)
-
+        jumps = partial(_jumps, held, inside, across)
         late = [v for v, rule in kept.items() if rule.ctype is Constraint and equations.mention(rule, jumps)]
         if not late:
             return across
         for v in late:
             del kept[v]
+
+
+def _never(v):
+    return False
+
+
+def _jumps(held, inside, across, v):
+    """Whether ``v`` is continuous inside the stages only."""
+    return v in held or (v in inside and v not in across)
 
 
 def _closure(known, rules, equations):

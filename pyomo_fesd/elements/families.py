@@ -87,17 +87,19 @@ def refuse_lists_of_times(block, times):
     """
     labels = set(times.wrt) - ({times.wrt.first()} if discretised(times.wrt) else set())
     for component in block.component_objects(Complementarity, active=True, descend_into=Block):
-        covered = set()
-        for data in component.values():
-            if times.time(data) is None and getattr(data, '_args', None) is not None:
-                at = {times.time(v) for side in data._args if hasattr(side, 'is_expression_type') for v in identify_variables(side)} - {None}
-                covered |= at if len(at) == 1 else set()
-        if covered >= labels:
+        if labels <= {_only_time(data, times) for data in component.values() if times.time(data) is None}:
             raise FesdError(
                 component,
                 "conditions for every time that are not indexed by time: elements that move would not see their switches",
                 f"declare Complementarity({times.wrt.name}, rule=...), or a ComplementarityList in a Block over time",
             )
+
+
+def _only_time(condition, times):
+    """The time of all variables of a condition; None if they have several or none."""
+    sides = (side for side in getattr(condition, '_args', None) or () if hasattr(side, 'is_expression_type'))
+    found = {times.time(v) for side in sides for v in identify_variables(side)} - {None}
+    return found.pop() if len(found) == 1 else None
 
 
 def read_families(conditions, continuity, times):

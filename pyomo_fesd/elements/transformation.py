@@ -6,8 +6,8 @@ from pyomo.core import Block, Transformation, TransformationFactory
 from pyomo.gdp import Disjunction
 
 from pyomo_fesd import marks, records
-from pyomo_fesd.elements.controls import check_controls, hold_controls
-from pyomo_fesd.elements.continuity import inner_label, read_continuity
+from pyomo_fesd.elements.continuity import check_told, inner_label, read_continuity
+from pyomo_fesd.elements.controls import check_controls, fix_given, hold_controls
 from pyomo_fesd.elements.cross import FORMS, add_cross_complementarity, sources
 from pyomo_fesd.elements.equilibration import MODES, add_equilibration
 from pyomo_fesd.elements.expansion import discretise
@@ -18,7 +18,8 @@ from pyomo_fesd.elements.families import (
     refuse_lists_of_times,
     warn_gauss_on_curved_surfaces,
 )
-from pyomo_fesd.elements.grid import check_resolution, read_grid
+from pyomo_fesd.elements.free_time import check_free_time, factors
+from pyomo_fesd.elements.grid import check_resolution, read_grid, share_elements
 from pyomo_fesd.elements.lengths import add_lengths, check_orders, multiply_derivatives
 from pyomo_fesd.elements.mixed import split_mixed
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
@@ -35,8 +36,18 @@ def _gamma(arg):
     return gamma
 
 
+def _numbers(arg):
+    """A positive integer, or a list of them."""
+    return [PositiveInt(n) for n in arg] if isinstance(arg, (list, tuple)) else PositiveInt(arg)
+
+
 def _components(arg):
     return list(arg) if isinstance(arg, (list, tuple)) else [arg]
+
+
+def _lengths(arg):
+    """Vars in the order of the stages, from a list or an indexed Var."""
+    return None if arg is None else list(arg.values() if hasattr(arg, 'values') else arg)
 
 
 def _active_disjunctions(block, wrt):
@@ -68,7 +79,12 @@ class FiniteElements(Transformation):
     CONFIG = ConfigDict('fesd.finite_elements')
     CONFIG.declare('wrt', ConfigValue(description="the ContinuousSet of time; may be left out if there is only one"))
     CONFIG.declare(
-        'nfe', ConfigValue(default=10, domain=PositiveInt, description="number of finite elements, all stages together")
+        'nfe',
+        ConfigValue(
+            default=10,
+            domain=_numbers,
+            description="number of finite elements, all stages together; or a list with one number for each stage",
+        ),
     )
     CONFIG.declare('ncp', ConfigValue(default=3, domain=PositiveInt, description="collocation points in each element (K)"))
     CONFIG.declare(
@@ -110,7 +126,11 @@ class FiniteElements(Transformation):
     )
     CONFIG.declare(
         'piecewise_constant',
-        ConfigValue(default=[], domain=_components, description="controls (Vars over time) held constant on each stage"),
+        ConfigValue(
+            default=[],
+            domain=_components,
+            description="inputs (Vars or mutable Params over time) that are constant on each stage; the value at its end counts",
+        ),
     )
     CONFIG.declare(
         'continuous',
@@ -119,6 +139,17 @@ class FiniteElements(Transformation):
             domain=_components,
             description="algebraic Vars over time that are continuous although no equation says so; states need not be named",
         ),
+    )
+    CONFIG.declare(
+        'final_time',
+        ConfigValue(
+            default=None,
+            description="a Var: how long the horizon lasts, whatever its labels; the plant stays written in its own time",
+        ),
+    )
+    CONFIG.declare(
+        'stage_lengths',
+        ConfigValue(default=None, domain=_lengths, description="the same for each control stage: one Var for each"),
     )
     CONFIG.declare(
         'stages',
@@ -138,6 +169,8 @@ class FiniteElements(Transformation):
             stages = self._discretise(instance, wrt, config)
             grid = read_grid(wrt, stages)
             check_orders(instance.model(), wrt)
+            sigma = factors(config.final_time, config.stage_lengths, stages)
+            fix_given(config.piecewise_constant, grid, wrt)
             times = TimeIndex(wrt)
             pairs, mixed = conditions_over_time(instance, times)
             continuity = self._continuity(instance, times, [*pairs.values(), *mixed.values()], grid, config)
@@ -154,7 +187,7 @@ class FiniteElements(Transformation):
                 warn_gauss_on_curved_surfaces(families, continuity, times)
 
             block = self._block(instance, wrt)
-            add_lengths(block, grid, config.length_bounds)
+            add_lengths(block, grid, config.length_bounds, sigma)
             for integral, rule in integrands:
                 rebuild(integral, rule, block, grid)
             hold_controls(block, config.piecewise_constant, grid, wrt)
@@ -170,6 +203,8 @@ class FiniteElements(Transformation):
         if wrt in records.records(instance).grids:
             raise FesdError(wrt, "its elements are movable already", "apply fesd.finite_elements once for each ContinuousSet")
         check_controls(config.piecewise_constant, wrt)
+        check_told(config.continuous, config.piecewise_constant, wrt)
+        check_free_time(config.final_time, config.stage_lengths, wrt)
         refuse_lists_of_times(instance, TimeIndex(wrt))
         if discretised(wrt):
             return
@@ -177,14 +212,7 @@ class FiniteElements(Transformation):
             raise FesdError(
                 wrt, "stages= was given for a set that is not discretised yet", "put the stage boundaries into the ContinuousSet"
             )
-        stages = len(wrt) - 1
-        if config.nfe % stages:
-            raise FesdError(
-                wrt,
-                f"nfe={config.nfe} elements cannot be shared equally among {stages} control stages",
-                f"take a multiple of {stages}",
-            )
-        check_resolution(wrt, config.nfe, config.ncp)
+        check_resolution(wrt, share_elements(wrt, config.nfe), config.ncp)
 
     @staticmethod
     def _continuity(instance, times, families, grid, config):
@@ -201,7 +229,8 @@ class FiniteElements(Transformation):
             stages = sorted({wrt.first(), wrt.last(), *(config.stages or ())})
         else:
             stages = list(wrt)
-            discretise(instance, wrt, config.nfe, config.ncp, config.scheme)
+            shares = share_elements(wrt, config.nfe)
+            discretise(instance, wrt, shares, config.ncp, config.scheme, config.piecewise_constant)
         records.repeat(instance, wrt)
         return stages
 

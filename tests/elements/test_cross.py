@@ -9,12 +9,11 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
-from pyomo_fesd import FesdError
 from pyomo_fesd.complementarity import read
 from pyomo_fesd.timeindex import TimeIndex
 from tests.models import dcs
 from tests.problems import relay_of_states, setpoint, sliding, weir
-from tests.problems.running import EXACT_SCHEMES, LEGENDRE, RADAU, SCHEMES, move, run, seen, solve, transform
+from tests.problems.running import EXACT_SCHEMES, LEGENDRE, RADAU, SCHEMES, move, run, solve, transform
 
 FORMS = ('element', 'stage', 'full')
 

@@ -30,7 +30,7 @@ def states(points=(0, 2)):
 
 def expand(m, nfe=3, ncp=2, scheme=RADAU):
     """Discretise without making anything movable; returns the model."""
-    discretise(m, m.t, nfe, ncp, scheme)
+    discretise(m, m.t, [nfe], ncp, scheme)
     return m
 
 
@@ -115,9 +115,7 @@ def test_a_complementarity_over_time_gets_every_new_time_by_its_rule():
 def test_a_complementarity_that_skips_the_first_time_still_skips_it():
     m = states()
     m.F = pyo.Var(m.t, bounds=(0, None))
-    m.full = Complementarity(
-        m.t, rule=lambda m, t: Complementarity.Skip if t == 0 else complements(m.F[t] >= 0, 1 - m.x[t] >= 0)
-    )
+    m.full = Complementarity(m.t, rule=lambda m, t: Complementarity.Skip if t == 0 else complements(m.F[t] >= 0, 1 - m.x[t] >= 0))
     expand(m)
     assert set(m.full) == set(m.t) - {0}
 
@@ -364,7 +362,7 @@ def test_what_cannot_be_expanded_is_found_in_nested_blocks(kind):
     m.plant['a'].unit = signum.build()
     spoil(m.plant['a'].unit)
     with pytest.raises(FesdError, match=r'^plant\[a\].unit.bad: '):
-        discretise(m, m.plant['a'].unit.t, 3, 2, RADAU)
+        discretise(m, m.plant['a'].unit.t, [3], 2, RADAU)
 
 
 def test_a_hybrid_component_by_hand_that_holds_nothing_is_no_reason_to_refuse():
