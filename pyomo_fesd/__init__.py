@@ -5,13 +5,26 @@ Importing this registers ``fesd.dcs``, ``fesd.finite_elements`` and ``mpec_hybri
 
 import pyomo.environ  # noqa: F401  registers Pyomo's own plug-ins first
 
+from pyomo_fesd.clock import clock
 from pyomo_fesd.dcs import transformation as _dcs  # noqa: F401
 from pyomo_fesd.elements import transformation as _elements  # noqa: F401
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.plot import plot
+from pyomo_fesd.projected import projection
 from pyomo_fesd.report import report
 from pyomo_fesd.solver import certify
 from pyomo_fesd.trajectory import element_lengths, physical_time, switches, trajectory
 
 __version__ = '0.1.0'
-__all__ = ['FesdError', 'certify', 'element_lengths', 'physical_time', 'plot', 'report', 'switches', 'trajectory']
+__all__ = [
+    'FesdError',
+    'certify',
+    'clock',
+    'element_lengths',
+    'physical_time',
+    'plot',
+    'projection',
+    'report',
+    'switches',
+    'trajectory',
+]

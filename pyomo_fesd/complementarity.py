@@ -94,6 +94,16 @@ def _gap(s):
     return _difference(s.body, s.lower) if s.upper is None else _difference(s.upper, s.body)
 
 
+def gap(arg, where):
+    """``arg`` as one expression that must not be negative: the distance to its bound if it is an inequality."""
+    if not isinstance(arg, (EqualityExpression, InequalityExpression, RangedExpression)):
+        return arg
+    s = side(arg)
+    if isinstance(arg, EqualityExpression) or (s.lower is None) == (s.upper is None):
+        raise FesdError(where, f"'{arg}' is not one inequality", "write c >= 0, or each bound by itself")
+    return _gap(s)
+
+
 def _lower_gap(s):
     """The same where a second bound is only a bound."""
     return _gap(s) if s.lower is None else _difference(s.body, s.lower)

@@ -35,9 +35,11 @@ def test_public_names():
     assert sorted(pyomo_fesd.__all__) == [
         'FesdError',
         'certify',
+        'clock',
         'element_lengths',
         'physical_time',
         'plot',
+        'projection',
         'report',
         'switches',
         'trajectory',
