@@ -146,7 +146,7 @@ def read(data):
         if counts[i] == 1 and counts[j] == 2 and stated[i]:
             # a bound stated on one side, two bounds on the other: only its lower bound can be meant
             return Pair(_gap(sides[i]), _lower_gap(sides[j]))
-        if counts[i] == 2 and counts[j] and not any(stated) and _is_zero(sides[j].lower):
+        if counts[i] == 2 and counts[j] and not any(stated) and _never_negative(sides[j], counts[j], sides[i]):
             # l <= x <= u  perp  y  is the same as  x - l  perp  y  where y >= 0
             return Pair(_lower_gap(sides[0]), _lower_gap(sides[1]))
     raise FesdError(
@@ -154,6 +154,11 @@ def read(data):
         f"the two sides '{args[0]}' and '{args[1]}' have {sum(counts)} finite bounds between them, two are needed",
         "write complements(G >= 0, H >= 0), or complements(inequality(l, x, u), F), or give the bare variables their bounds",
     )
+
+
+def _never_negative(s, count, other):
+    """Whether the bare variable of a side begins at zero; if both have two bounds, whether both do."""
+    return _is_zero(s.lower) and (count == 1 or _is_zero(other.lower))
 
 
 def _is_zero(bound):

@@ -4,25 +4,17 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Expression, Var, value
 from pyomo.gdp import Disjunction
-from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
-from pyomo_fesd.complementarity import Pair, read
-from pyomo_fesd.elements.cross import sources
+from pyomo_fesd.conditions import conditions, number, positions, positive
 from pyomo_fesd.elements.grid import ONE_ELEMENT_SCHEMES, read_grid
 from pyomo_fesd.elements.lengths import duration
-from pyomo_fesd.elements.mixed import parts
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set, strip_time
-
-#: A multiplier nearer than this to 0 (or to 1) counts as off (or on).
-CLEAR = 1e-6
-#: The modes of a condition with two bounds on one side.
-AT_LOWER, BETWEEN, AT_UPPER = 'at lower bound', 'between', 'at upper bound'
 
 
 class Switch(NamedTuple):
@@ -111,24 +103,20 @@ def trajectory(model, wrt=None):
     elements = _elements(wrt, times)
     columns = {'label': list(times), 'element': elements}
     for name, values in families.items():
-        columns[strip_time(name)] = [_number(values.get(t)) for t in times]
-    inside = {t: n if n and t != wrt.first() else (t,) for t, n in zip(times, elements)}
-    for name, modes in (_multipliers(model, index) | dict(_positions(model, wrt, index, inside))).items():
+        columns[strip_time(name)] = [number(values.get(t)) for t in times]
+    inside = _grid(wrt).elements if _has_elements(wrt) else ()
+    for name, modes in (_multipliers(model, index) | positions(model, wrt, index, inside)).items():
         for mode, weights in modes.items():
-            columns[f'{name}: {mode}'] = [_number(weights.get(t)) for t in times]
+            columns[f'{name}: {mode}'] = [number(weights.get(t)) for t in times]
     return pd.DataFrame(columns, index=pd.Index(times.values(), name='time'))
 
 
-def _number(expr):
-    try:
-        result = None if expr is None else value(expr, exception=False)
-    except (ArithmeticError, ValueError):
-        result = None
-    return np.nan if result is None or isinstance(result, complex) else result
+def _has_elements(wrt):
+    return discretised(wrt) and wrt.get_discretization_info()['scheme'] in ONE_ELEMENT_SCHEMES
 
 
 def _elements(wrt, times):
-    if not discretised(wrt) or wrt.get_discretization_info()['scheme'] not in ONE_ELEMENT_SCHEMES:
+    if not _has_elements(wrt):
         return [0] * len(times)
     owner = _grid(wrt).element_of()
     return [owner[t].n if t in owner else 1 for t in times]
@@ -169,7 +157,7 @@ def switches(model, wrt=None):
     """
     wrt = find_continuous_set(model, wrt, 'switches')
     grid, index, found = _grid(wrt), TimeIndex(wrt), Switches()
-    times, systems = physical_time(model, wrt), _multipliers(model, index) | _conditions(model, wrt, index)
+    times, systems = physical_time(model, wrt), _multipliers(model, index) | conditions(model, wrt, index)
     for name, modes in systems.items():
         before = None
         for element in grid.elements:
@@ -184,54 +172,7 @@ def switches(model, wrt=None):
 
 def _active(modes, element):
     """The mode with a positive multiplier inside an element; several slide; None where nothing tells."""
-    on = [mode for mode, weights in modes.items() if any(t in weights and value(weights[t]) > CLEAR for t in element.points)]
+    on = positive(modes, element.points) or positive(modes, (element.left,))
     if not on:
         return None
     return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on)
-
-
-def _conditions(model, wrt, index):
-    """Hand-written complementarities as systems of modes: a pair by the side that is positive, a mixed one by its bounds.
-
-    Those that ``fesd.finite_elements`` has aggregated are inactive but at the first time; others that are inactive are off.
-    """
-    own = (c for c in model.component_data_objects(Complementarity, descend_into=Block) if not marks.is_generated(c))
-    block, found = records(model).grids.get(wrt), {}
-    moved = ComponentSet(c for conditions in sources(block).values() for c in conditions) if block is not None else ()
-    for name, family in index.families(own).items():
-        if any(c.active or c in moved for c in family.values()):
-            weights = {t: _weights(c) for t, c in family.items() if block is not None or c.active}
-            found[strip_time(name)] = {mode: {t: w[mode] for t, w in weights.items() if mode in w} for mode in _modes(weights)}
-    return found
-
-
-def _modes(weights):
-    return dict.fromkeys(mode for w in weights.values() for mode in w)
-
-
-def _weights(condition):
-    """What is positive in each mode of one condition at one time."""
-    read_as = read(condition)
-    if isinstance(read_as, Pair):
-        return {'G > 0': read_as.G, 'H > 0': read_as.H}
-    p, n = parts(condition) or (read_as.F, -read_as.F)
-    return {AT_LOWER: p, BETWEEN: min(_number(read_as.above), _number(read_as.below)), AT_UPPER: n}
-
-
-def _positions(model, wrt, index, elements):
-    """Which of the three modes each mixed condition is in, as shares like those of a Disjunction: 1 where it is."""
-    for name, modes in _conditions(model, wrt, index).items():
-        if BETWEEN in modes:
-            totals = {}
-            for mode, weights in modes.items():
-                for t, w in weights.items():
-                    key = mode, elements[t]
-                    totals[key] = totals.get(key, 0.0) + max(_number(w), 0.0)
-            sums = {n: sum(totals.get((mode, n), 0.0) for mode in modes) for n in elements.values()}
-            yield (
-                name,
-                {
-                    mode: {t: totals[mode, elements[t]] / sums[elements[t]] for t in weights if sums[elements[t]] > 0}
-                    for mode, weights in modes.items()
-                },
-            )

@@ -74,14 +74,13 @@ def _equal(condition):
 def _block(data):
     """The block for what is generated from the component of ``data``, made at its first time; and the index in it."""
     component, parent = data.parent_component(), data.parent_block()
-    if parent.component(marks.GENERATED + 'mixed') is None:
-        parent.add_component(marks.GENERATED + 'mixed', Block())
-    home = parent.component(marks.GENERATED + 'mixed')
-    if home.component(component.local_name) is None:
+    if replacement(data) is None:
+        if parent.component(marks.GENERATED + 'mixed') is None:
+            parent.add_component(marks.GENERATED + 'mixed', Block())
         block = Block()
-        home.add_component(component.local_name, block)
+        parent.component(marks.GENERATED + 'mixed').add_component(component.local_name, block)
         _declare(block, (component.index_set(),) if component.is_indexed() else ())
-    return home.component(component.local_name), _tuple(data.index())
+    return replacement(data), _tuple(data.index())
 
 
 def _declare(block, index):
@@ -147,11 +146,16 @@ def repeats(condition, side):
 
 def parts(condition):
     """p and n of a user's mixed condition that was split; None for any other."""
-    home = condition.parent_block().component(marks.GENERATED + 'mixed')
-    block = home.component(condition.parent_component().local_name) if home is not None else None
+    block = replacement(condition)
     if block is None or condition.index() not in block.p:
         return None
     return block.p[condition.index()], block.n[condition.index()]
+
+
+def replacement(condition):
+    """The block with what was generated from the component of a user's mixed condition; None for any other."""
+    home = condition.parent_block().component(marks.GENERATED + 'mixed')
+    return home.component(condition.parent_component().local_name) if home is not None else None
 
 
 def _is_ours(block):
