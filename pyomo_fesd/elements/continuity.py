@@ -146,7 +146,7 @@ def read_continuity(model, times, labels, held, told, trace):
     """
     rules = ComponentMap(marks.marked(model, marks.CONTINUOUS))
     trace = trace or (rules and held) or any(r.ctype is Complementarity for r in rules.values())
-    equations = Equations(model, times, labels) if trace else None
+    equations = Equations(model, times, labels, rules) if trace else None
     start, held = [*(d.get_state_var() for d in derivatives(model, times.wrt)), *each(told)], each(held)
     inside = _closure(Known(_is_fixed, start, held), rules, equations)
 
@@ -201,15 +201,19 @@ def _closure(known, rules, equations):
 
 
 class Equations:
-    """The algebraic equations of a few times, with the variables that they contain."""
+    """The algebraic equations of a few times, with the variables that they contain; without the rules of marked variables.
 
-    def __init__(self, model, times, labels):
+    These say that p and n are as continuous as the quantity that switches, and not the other way round.
+    """
+
+    def __init__(self, model, times, labels, rules):
         self._times, self._labels = times, labels
+        apart = ComponentSet(rules.values())
         constraints = model.component_data_objects(Constraint, active=True, descend_into=Block)
         self._rows = [
             (c.body, [v for v in identify_variables(c.body) if times.time(v) is not None])
             for c in constraints
-            if c.equality and times.time(c) in labels and not c.parent_component().local_name.endswith(DISCRETISATION)
+            if c.equality and times.time(c) in labels and _is_model(c.parent_component(), apart)
         ]
 
     def _data(self, component):
@@ -275,6 +279,10 @@ class Equations:
         if rule is not None:
             return [c.body for c in self._data(rule) if any(u is v for u in identify_variables(c.body))]
         return [self._rows[row_of[columns[v]]][0]] if v in columns and row_of[columns[v]] >= 0 else []
+
+
+def _is_model(constraint, apart):
+    return constraint not in apart and not constraint.local_name.endswith(DISCRETISATION)
 
 
 def _under_determined(incidence, row_of):
