@@ -17,7 +17,7 @@ from pyomo_fesd.timeindex import TimeIndex, derivatives
 
 
 def add_lengths(block, grid, gamma, factors=None):
-    """Declare r_n and the length of every control stage; sigma of each stage if there are ``factors``.
+    """Declare r_n and the length of every control stage; sigma of each element if there are ``factors`` (by stage).
 
     Leaves ``block.element`` (1..N), ``block.stage``, ``block.r`` and ``block.stage_length``: sum_n hbar_n r_n = nominal length of
     the stage (eq. 10).  A stage of one element has no freedom.
@@ -32,7 +32,7 @@ def add_lengths(block, grid, gamma, factors=None):
     block.r = Var(block.element, bounds=(1 - gamma, None), initialize=1)
     mark(block, ARTIFICIAL, block.r, 1 + gamma)
     if factors is not None:
-        block.sigma = Expression(block.stage, initialize=dict(zip(grid.stages, factors)))
+        block.sigma = Expression(block.element, initialize={e.n: factors[e.stage - 1] for e in grid.elements})
 
     @block.Constraint(block.stage)
     def stage_length(b, stage):
@@ -85,7 +85,7 @@ def element_length(block, element):
 def speed(block, element):
     """Time of the plant in one unit of the labels, inside an element: r_n, or r_n sigma."""
     sigma = block.component('sigma')
-    return block.r[element.n] if sigma is None else block.r[element.n] * sigma[element.stage]
+    return block.r[element.n] if sigma is None else block.r[element.n] * sigma[element.n]
 
 
 def duration(block, element):
