@@ -14,6 +14,7 @@ from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import RangeSet, Var, value
 from pyomo.core.base.block import BlockData
 from pyomo.core.expr.calculus.derivatives import Modes, differentiate
+from pyomo.core.expr.calculus.diff_with_pyomo import DifferentiationException
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity, complements
@@ -101,8 +102,8 @@ def _gradient(wall, states, block):
             )
     try:
         return [differentiate(wall, wrt=x, mode=Modes.reverse_symbolic) if x in among else 0 for x in states]
-    except (NotImplementedError, ValueError, KeyError) as error:
-        raise FesdError(block, f"projection: '{wall}' cannot be differentiated ({error})", "write the wall differently") from error
+    except DifferentiationException as error:
+        raise FesdError(block, f"projection: '{wall}' cannot be differentiated", "write the wall in smooth functions") from error
 
 
 def _is_algebraic(v):
