@@ -2,8 +2,8 @@
 
     dc/dt = 1,   c = first label at the first label
 
-Once elements move, a label of the ContinuousSet is not physical time; a state with derivative 1 is, also where the final time or the
-stage lengths are free.
+Once elements move, a label of the ContinuousSet is not physical time; a state with derivative 1 is, also where the final time or
+the stage lengths are free.
 
 Takes: a model that is not discretised yet.
 Leaves: ``time``, ``rate`` and ``tick`` in a block of its own.

@@ -14,8 +14,8 @@ from functools import partial
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, Constraint, Var
-from pyomo.core.expr.visitor import identify_variables
+from pyomo.core import Block, Constraint, Param, Var
+from pyomo.core.expr.visitor import identify_mutable_parameters, identify_variables
 from pyomo.mpec import Complementarity
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
@@ -100,8 +100,14 @@ def _rule_of(v, rules):
 
 
 def _all_in(expr, known):
-    variables = list(identify_variables(expr)) if hasattr(expr, 'is_expression_type') else []
+    variables = list(_variables(expr)) if hasattr(expr, 'is_expression_type') else []
     return bool(variables) and all(v in known for v in variables)
+
+
+def _variables(expr):
+    """The variables of ``expr``, and the mutable Params, which may change from stage to stage."""
+    yield from identify_variables(expr)
+    yield from identify_mutable_parameters(expr)
 
 
 def inner_label(family, wrt):
@@ -142,10 +148,10 @@ def read_continuity(model, times, labels, held, told, trace):
     told : list of Var
         variables of which the user says that they are continuous
     trace : bool
-        whether algebraic variables matter in any case: they do not where ``fesd.dcs`` wrote every condition and nothing is held
+        whether algebraic variables matter in any case: they do not where ``fesd.dcs`` wrote every condition, on a single stage
     """
     rules = ComponentMap(marks.marked(model, marks.CONTINUOUS))
-    trace = trace or (rules and held) or any(r.ctype is Complementarity for r in rules.values())
+    trace = trace or any(r.ctype is Complementarity for r in rules.values())
     equations = Equations(model, times, labels, rules) if trace else None
     start, held = [*(d.get_state_var() for d in derivatives(model, times.wrt)), *each(told)], each(held)
     inside = _closure(Known(_is_fixed, start, held), rules, equations)
@@ -153,15 +159,15 @@ def read_continuity(model, times, labels, held, told, trace):
     def keeps_value(v):
         among = v.parent_component()
         return _is_fixed(v) and (
-            times.time(v) is None or (among.is_indexed() and all(u.fixed and u.value == v.value for u in among.values()))
+            times.time(v) is None or (among.is_indexed() and all(_is_fixed(u) and u.value == v.value for u in among.values()))
         )
 
-    across = _across(Known(keeps_value, start), rules, held, inside, equations) if held or trace else inside
+    across = _across(Known(keeps_value, start), rules, held, inside, equations) if trace else inside
     return Continuity(rules, inside, across, equations)
 
 
 def _is_fixed(v):
-    return not v.is_indexed() and v.fixed
+    return not v.is_indexed() and (v.ctype is Param or v.fixed)
 
 
 def _across(start, rules, held, inside, equations):
@@ -211,7 +217,7 @@ class Equations:
         apart = ComponentSet(rules.values())
         constraints = model.component_data_objects(Constraint, active=True, descend_into=Block)
         self._rows = [
-            (c.body, [v for v in identify_variables(c.body) if times.time(v) is not None])
+            (c.body, [v for v in _variables(c.expr) if times.time(v) is not None])
             for c in constraints
             if c.equality and times.time(c) in labels and _is_model(c.parent_component(), apart)
         ]
@@ -225,7 +231,7 @@ class Equations:
 
     def mention(self, rule, test):
         """Whether a Constraint contains a variable for which ``test`` is true."""
-        return any(test(v) for c in self._data(rule) for v in identify_variables(c.body))
+        return any(test(v) for c in self._data(rule) for v in _variables(c.expr))
 
     def follows(self, s, condition, known):
         """Whether ``condition`` makes s = max(0, z) of a known z."""
@@ -233,7 +239,7 @@ class Equations:
 
     @staticmethod
     def _kink(own, condition):
-        return [v for side in condition[own.index()]._args for v in identify_variables(side)]
+        return [v for side in condition[own.index()]._args for v in _variables(side)]
 
     def tied(self, known):
         """Variables that equations tie to known ones.

@@ -63,10 +63,12 @@ class FiniteElements(Transformation):
 
     pyomo.dae discretises; then every discretisation equation gets the multiplier r_n = h_n/hbar_n, the complementarities over
     time are aggregated over each element (eq. 11), and step equilibration ties the lengths where nothing switches (eq. 13).
-    Where the complementarities come from does not matter: ``fesd.dcs``, or the user's own ``Complementarity`` over time.
+    Where the complementarities come from does not matter: ``fesd.dcs``, or the user's own ``Complementarity`` over time; one with
+    two bounds on one side becomes two pairs.
 
     The points that the ContinuousSet has before are boundaries of control stages: they keep their physical time, and each
-    stage gets the same number of elements.  On a model that is discretised already, the present grid is made movable.
+    stage gets the same number of elements, unless ``nfe`` lists others.  The final time, or the length of each stage, may be a
+    variable.  On a model that is discretised already, the present grid is made movable.
 
     Raises
     ------
@@ -166,23 +168,19 @@ class FiniteElements(Transformation):
         wrt = find_continuous_set(instance, config.wrt, 'fesd.finite_elements')
         self._check(instance, wrt, config)
         with restored_on_error(instance, wrt):
-            stages = self._discretise(instance, wrt, config)
+            stages, times = self._discretise(instance, wrt, config), TimeIndex(wrt)
             grid = read_grid(wrt, stages)
+            fix_given(config.piecewise_constant, grid, wrt)
+            records.repeat(instance, wrt)
             check_orders(instance.model(), wrt)
             sigma = factors(config.final_time, config.stage_lengths, stages)
-            fix_given(config.piecewise_constant, grid, wrt)
-            times = TimeIndex(wrt)
-            pairs, mixed = conditions_over_time(instance, times)
-            continuity = self._continuity(instance, times, [*pairs.values(), *mixed.values()], grid, config)
-            pairs |= split_mixed(mixed, continuity, times)
-            families = read_families(pairs, continuity, times)
-            waiting = next(_active_disjunctions(instance, wrt), None)
-            if waiting is not None and not families:
-                raise FesdError(
-                    waiting, "an active Disjunction over time", "apply fesd.dcs first: its complementarity finds the switches"
-                )
             integrands = [(i, integrand(i)) for i in integrals(instance.model(), wrt)]
             warn_explicit_time(instance, wrt, grid, integrands)
+
+            pairs, mixed = conditions_over_time(instance, times)
+            self._refuse_waiting(instance, wrt, pairs or mixed)
+            continuity = self._continuity(instance, times, [*pairs.values(), *mixed.values()], grid, config)
+            families = read_families(pairs | split_mixed(mixed, continuity, times), continuity, times)
             if not grid.right_is_stage:
                 warn_gauss_on_curved_surfaces(families, continuity, times)
 
@@ -215,23 +213,29 @@ class FiniteElements(Transformation):
         check_resolution(wrt, share_elements(wrt, config.nfe), config.ncp)
 
     @staticmethod
+    def _refuse_waiting(instance, wrt, conditions):
+        """A Disjunction that nobody transformed would hold nothing; beside other conditions it may be there on purpose."""
+        waiting = next(_active_disjunctions(instance, wrt), None)
+        if waiting is not None and not conditions:
+            raise FesdError(
+                waiting, "an active Disjunction over time", "apply fesd.dcs first: its complementarity finds the switches"
+            )
+
+    @staticmethod
     def _continuity(instance, times, families, grid, config):
         """What is continuous where the families begin, by the equations there if they can matter."""
         labels = {inner_label(family, times.wrt) for family in families}
         written = not all(marks.is_generated(condition) for family in families for condition in family.values())
-        trace = written or (bool(families) and not grid.right_is_stage)
+        trace = written or (bool(families) and (len(grid.stages) > 1 or not grid.right_is_stage))
         return read_continuity(instance.model(), times, labels, config.piecewise_constant, config.continuous, trace)
 
     @staticmethod
     def _discretise(instance, wrt, config):
-        """Lay the grid if there is none, finish what waited for it; return the stage boundaries."""
+        """Lay the grid if there is none; return the stage boundaries."""
         if discretised(wrt):
-            stages = sorted({wrt.first(), wrt.last(), *(config.stages or ())})
-        else:
-            stages = list(wrt)
-            shares = share_elements(wrt, config.nfe)
-            discretise(instance, wrt, shares, config.ncp, config.scheme, config.piecewise_constant)
-        records.repeat(instance, wrt)
+            return sorted({wrt.first(), wrt.last(), *(config.stages or ())})
+        stages, shares = list(wrt), share_elements(wrt, config.nfe)
+        discretise(instance, wrt, shares, config.ncp, config.scheme, config.piecewise_constant)
         return stages
 
     @staticmethod

@@ -14,6 +14,7 @@ from pyomo_fesd import FesdError, kink
 from pyomo_fesd.complementarity import read
 from pyomo_fesd.elements import continuity as module
 from pyomo_fesd.elements.continuity import read_continuity
+from pyomo_fesd.elements.expansion import discretise
 from pyomo_fesd.timeindex import TimeIndex
 from tests.models import dcs
 from tests.problems import setpoint, weir
@@ -214,6 +215,16 @@ def test_an_input_that_is_fixed_is_continuous_inside_a_stage():
     assert continuous(m, 'a', 'u') == ({'a', 'u'}, set())
 
 
+def test_a_param_is_continuous_inside_a_stage_and_at_its_end_if_it_does_not_change():
+    m = plant()
+    m.p = pyo.Param(m.t, initialize=2.0, mutable=True)
+    equation(m, 'tie', lambda m, t: m.a[t] == m.p[t] * m.x[t])
+    equation(m, 'alone', lambda m, t: m.b[t] == m.p[t])
+    assert continuous(m, 'a', 'b') == ({'a', 'b'}, {'a', 'b'})
+    m.p[2] = 3.0
+    assert continuous(m, 'a', 'b') == ({'a', 'b'}, set())
+
+
 @pytest.mark.parametrize('scheme', SCHEMES)
 def test_a_mode_may_change_at_a_stage_boundary_because_of_what_follows_from_a_control(scheme):
     m = setpoint.build(handed_on=True)
@@ -222,6 +233,19 @@ def test_a_mode_may_change_at_a_stage_boundary_because_of_what_follows_from_a_co
     assert m.x[2].value == pytest.approx(setpoint.FINAL, abs=1e-9)
     (switch,) = pyomo_fesd.switches(m)
     assert switch.time == pytest.approx(setpoint.SWITCH, abs=1e-9)
+
+
+@pytest.mark.parametrize('given', ['Param', 'Var'])
+def test_inputs_that_are_given_time_by_time_may_change_the_mode_at_a_stage_boundary_too(given):
+    m = setpoint.build_given() if given == 'Param' else setpoint.build()
+    pyo.TransformationFactory('fesd.dcs').apply_to(m)
+    fill = (lambda t, value: m.p[t].set_value(value)) if given == 'Param' else (lambda t, value: m.u[t].fix(value))
+    discretise(m, m.t, [2, 2], 2, RADAU)
+    for t in m.t:
+        fill(t, setpoint.SETPOINTS[0 if t <= 1 else 1])
+    solve(move(m, stages=[1]))
+    assert m.x[2].value == pytest.approx(setpoint.FINAL, abs=1e-9)
+    assert pyomo_fesd.switches(m)[0].time == pytest.approx(setpoint.SWITCH, abs=1e-9)
 
 
 def test_a_hand_written_side_with_a_held_control_does_not_reach_into_the_next_stage(caplog):

@@ -216,6 +216,15 @@ def test_a_set_point_may_be_fixed_instead_of_stated_by_equations(caplog):
     assert no_warning(caplog)
 
 
+@pytest.mark.parametrize('scheme', SCHEMES)
+def test_a_set_point_may_be_a_param(scheme, caplog):
+    m = setpoint.build_given()
+    solve(transform(m, nfe=4, scheme=scheme, piecewise_constant=[m.p]))
+    assert m.x[1].value == pytest.approx(setpoint.MIDDLE, abs=1e-9)
+    assert m.x[2].value == pytest.approx(setpoint.FINAL, abs=1e-9)
+    assert no_warning(caplog)
+
+
 def test_what_was_fixed_or_given_is_as_it_was_after_a_later_error():
     m = steered({1: 3.0, 2: -5.0})
     m.p[1] = m.p[2] = 4
