@@ -55,8 +55,9 @@ def _remember_values(model):
 
     def restore():
         for v, value, stale, fixed in variables:
-            v.set_value(value, skip_validation=True)
-            v.stale, v.fixed = stale, fixed
+            if v.value != value or v.fixed != fixed:
+                v.set_value(value, skip_validation=True)
+                v.stale, v.fixed = stale, fixed
         for p, value in params:
             p._value = value
 
