@@ -152,7 +152,9 @@ def read(data):
     raise FesdError(
         data,
         f"the two sides '{args[0]}' and '{args[1]}' have {sum(counts)} finite bounds between them, two are needed",
-        "write complements(G >= 0, H >= 0), or complements(inequality(l, x, u), F), or give the bare variables their bounds",
+        "write complements(G >= 0, H >= 0), or give the bare variables their bounds"
+        if sum(counts) < 2
+        else "state the two that are meant: complements(G >= 0, H >= 0), or complements(inequality(l, x, u), F)",
     )
 
 

@@ -63,15 +63,22 @@ def _check_given(u, values, end, times, wrt):
     now = value(end, exception=False)
     if now is None:
         raise FesdError(end, f"{KEYWORD}: it has no value, and its stage gets this one", "give the value at the end of each stage")
-    first = values.get(wrt.first())
-    given = first is not None and first is not end and times[0] == wrt.first() and (u.ctype is Param or first.fixed)
-    before = value(first, exception=False) if given else None
+    first = values.get(wrt.first()) if times[0] == wrt.first() else None
+    before = _stated(u, first) if first is not None and first is not end else None
     if before is not None and abs(before - now) > 1e-12 * max(1.0, abs(now)):
         raise FesdError(
             first,
             f"{KEYWORD}: {before:g} here, but {now:g} at the end of this stage, '{end.name}'",
             "the value at the end of a stage is the value of the whole stage: give the same here, or leave it out",
         )
+
+
+def _stated(u, data):
+    """The value that the user has given to one data; None for a free Var, or the default of a Param."""
+    if u.ctype is Var:
+        return data.value if data.fixed else None
+    now = value(data, exception=False)
+    return None if now == u.default() else now
 
 
 def _stages(grid, wrt):
