@@ -86,12 +86,14 @@ def _add_signs(block, families):
 
 def _never_negative(expr, lower):
     """Whether the bounds of the variables say so, whatever values mutable Params will have."""
-    if expr.is_variable_type():
-        return expr.lb is not None and expr.lb >= 0
-    if any(True for _ in identify_mutable_parameters(expr)):
+    if any(True for _ in identify_mutable_parameters(expr)) or any(map(_bound_may_change, identify_variables(expr))):
         return False
-    low = lower.walk_expression(expr)[0]
+    low = expr.lb if expr.is_variable_type() else lower.walk_expression(expr)[0]
     return low is not None and low >= 0
+
+
+def _bound_may_change(v):
+    return any(hasattr(bound, 'is_expression_type') for bound in (v.lower, v.upper))
 
 
 def _hold_left_limits(block, families, grid, wrt):

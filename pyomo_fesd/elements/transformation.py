@@ -251,5 +251,5 @@ class FiniteElements(Transformation):
         return sources(pair.parent_block())[pair]
 
     def get_element_lengths(self, wrt):
-        """The length multipliers r_n = h_n/hbar_n (an IndexedVar over 1..N) of a moving grid."""
+        """The length multipliers r_n = h_n/hbar_n (an IndexedVar over 1..N) of a moving grid, both lengths in labels."""
         return records.records(wrt).grids[wrt].r

@@ -228,8 +228,9 @@ def test_equal_bounds_leave_the_variable_at_them_and_the_function_free():
     assert pyomo_fesd.report(m)['pairs'] == 0
 
 
-def test_bounds_that_are_mutable_params_follow_their_values():
-    m = solve(move(relay.build('Params'), 5, 2))
+@pytest.mark.parametrize('way', ['Params', 'declared Params'])
+def test_bounds_that_are_mutable_params_follow_their_values(way):
+    m = solve(move(relay.build(way), 5, 2))
     m.low.set_value(0.5)  # the relay then never closes fully: x rises at rate 3/2 - 1/2
     solve(m)
     assert m.x[2].value == pytest.approx(0, abs=1e-9)

@@ -15,12 +15,16 @@ WAYS = {
     'bare variable': lambda m, t: complements(m.z[t], -m.x[t]),
     'other order, bare': lambda m, t: complements(-m.x[t], m.z[t]),
     'Params': lambda m, t: complements(pyo.inequality(m.low, m.z[t], m.high), -m.x[t]),
+    'declared Params': lambda m, t: complements(m.w[t], -m.x[t]),
     'a tuple': lambda m, t: (pyo.inequality(0, m.z[t], 1), -m.x[t]),
 }
 
 
 def build(way='inequality', x0=-2.0, discretise=None):
     m = plant(x0)
+    if way == 'declared Params':
+        m.w = pyo.Var(m.t, bounds=(m.low, m.high), initialize=0.5)
+        m.same = pyo.Constraint(m.t, rule=lambda m, t: m.w[t] == m.z[t])
     if discretise is not None:
         discretise(m)
     if way == 'block':
