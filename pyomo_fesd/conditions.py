@@ -3,9 +3,8 @@
 A pair is called by the side that is positive, a condition with two bounds on one side by where it stands.
 """
 
-import numpy as np
 from pyomo.common.collections import ComponentSet
-from pyomo.core import Block, value
+from pyomo.core import Block
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
@@ -14,6 +13,7 @@ from pyomo_fesd.elements.cross import sources
 from pyomo_fesd.elements.mixed import parts
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import strip_time
+from pyomo_fesd.values import number
 
 #: A multiplier nearer than this to 0 (or to 1) counts as off (or on).
 CLEAR = 1e-6
@@ -72,12 +72,3 @@ def _shares(modes, together):
 def positive(modes, labels):
     """The modes with something positive at one of ``labels``."""
     return [mode for mode, weights in modes.items() if any(t in weights and number(weights[t]) > CLEAR for t in labels)]
-
-
-def number(expr):
-    """Value of ``expr``; NaN where it has none."""
-    try:
-        result = None if expr is None else value(expr, exception=False)
-    except (ArithmeticError, ValueError):
-        result = None
-    return np.nan if result is None or isinstance(result, complex) else result

@@ -9,12 +9,13 @@ from pyomo.core import Block, Expression, Var, value
 from pyomo.gdp import Disjunction
 
 from pyomo_fesd import marks
-from pyomo_fesd.conditions import conditions, number, positions, positive
+from pyomo_fesd.conditions import conditions, positions, positive
 from pyomo_fesd.elements.grid import ONE_ELEMENT_SCHEMES, read_grid
 from pyomo_fesd.elements.lengths import duration
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set, strip_time
+from pyomo_fesd.values import number
 
 
 class Switch(NamedTuple):

@@ -12,17 +12,14 @@ Only the equations of the times that are asked about are read, in general those 
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, Constraint, Param, Var
-from pyomo.core.expr.visitor import identify_mutable_parameters, identify_variables
+from pyomo.core import Constraint, Param, Var
 from pyomo.mpec import Complementarity
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from pyomo_fesd import marks
+from pyomo_fesd.elements.equations import Equations, rule_of, variables_of
 from pyomo_fesd.errors import FesdError
-from pyomo_fesd.timeindex import DISCRETISATION, derivatives, is_indexed_by
+from pyomo_fesd.timeindex import derivatives, is_indexed_by
 
 
 @dataclass(frozen=True)
@@ -56,12 +53,13 @@ class Continuity:
 
     def rule(self, expr):
         """The Constraint that ties a marked variable to the states; None for any other side."""
-        rule = _rule_of(expr, self.rules) if expr.is_variable_type() else None
+        rule = rule_of(expr, self.rules) if expr.is_variable_type() else None
         return rule if rule is not None and rule.ctype is Constraint else None
 
     def curved(self, expr):
         """Whether ``expr``, or an equation that its variables follow from, is nonlinear."""
-        return any(e.polynomial_degree() not in (0, 1) for e in self.equations.behind(expr, self.rules, self.inside))
+        known = Known(_is_fixed, self.inside.given)
+        return any(e.polynomial_degree() not in (0, 1) for e in self.equations.behind(expr, self.rules, known))
 
     def add(self, variable, rule, expr):
         """Let a generated ``variable`` be as continuous as ``expr``, to which the Constraint ``rule`` ties it."""
@@ -94,20 +92,9 @@ class Known:
         return v in self.given or component in self.given or v in self.tied or component in self.tied or self.constant(v)
 
 
-def _rule_of(v, rules):
-    """What a mark on a variable, or on its component, says; None without one."""
-    return rules.get(v, rules.get(v.parent_component()))
-
-
 def _all_in(expr, known):
-    variables = list(_variables(expr)) if hasattr(expr, 'is_expression_type') else []
+    variables = list(variables_of(expr)) if hasattr(expr, 'is_expression_type') else []
     return bool(variables) and all(v in known for v in variables)
-
-
-def _variables(expr):
-    """The variables of ``expr``, and the mutable Params, which may change from stage to stage."""
-    yield from identify_variables(expr)
-    yield from identify_mutable_parameters(expr)
 
 
 def inner_label(family, wrt):
@@ -204,102 +191,3 @@ def _closure(known, rules, equations):
         if not ready:
             return known
         known.given.update(ready)
-
-
-class Equations:
-    """The algebraic equations of a few times, with the variables that they contain; without the rules of marked variables.
-
-    These say that p and n are as continuous as the quantity that switches, and not the other way round.
-    """
-
-    def __init__(self, model, times, labels, rules):
-        self._times, self._labels = times, labels
-        apart = ComponentSet(rules.values())
-        constraints = model.component_data_objects(Constraint, active=True, descend_into=Block)
-        self._rows = [
-            (c.body, [v for v in _variables(c.expr) if times.time(v) is not None])
-            for c in constraints
-            if c.equality and times.time(c) in labels and _is_model(c.parent_component(), apart)
-        ]
-
-    def _data(self, component):
-        return (d for d in component.values() if self._times.time(d) in self._labels)
-
-    def here(self, component):
-        """Whether a component has data at these times."""
-        return any(True for _ in self._data(component))
-
-    def mention(self, rule, test):
-        """Whether a Constraint contains a variable for which ``test`` is true."""
-        return any(test(v) for c in self._data(rule) for v in _variables(c.expr))
-
-    def follows(self, s, condition, known):
-        """Whether ``condition`` makes s = max(0, z) of a known z."""
-        return all(v is own or v in known for own in self._data(s) for v in self._kink(own, condition))
-
-    @staticmethod
-    def _kink(own, condition):
-        return [v for side in condition[own.index()]._args for v in _variables(side)]
-
-    def tied(self, known):
-        """Variables that equations tie to known ones.
-
-        They are the unknowns of the equations that are not under-determined (Dulmage and Mendelsohn): those that no alternating
-        path connects with an unmatched unknown.
-        """
-        columns, incidence = self._incidence(known)
-        if incidence is None:
-            return []
-        loose = _under_determined(incidence, maximum_bipartite_matching(incidence, perm_type='row'))
-        return [v for v, j in columns.items() if j not in loose]
-
-    def _incidence(self, known):
-        """Unknowns with their numbers, and which equation contains which."""
-        columns, places = ComponentMap(), []
-        for i, (_, variables) in enumerate(self._rows):
-            places += [(i, columns.setdefault(v, len(columns))) for v in variables if v not in known]
-        if not places:
-            return columns, None
-        return columns, csr_matrix((np.ones(len(places)), tuple(zip(*places))), shape=(len(self._rows), len(columns)))
-
-    def behind(self, expr, rules, known):
-        """``expr`` and the expressions that its variables follow from, down to what is continuous by itself."""
-        columns, incidence = self._incidence(Known(_is_fixed, known.given))
-        row_of = maximum_bipartite_matching(incidence, perm_type='row') if columns else []
-        found, seen, waiting = [expr], ComponentSet(), list(identify_variables(expr))
-        while waiting:
-            v = waiting.pop()
-            if v in seen:
-                continue
-            seen.add(v)
-            for source in self._sources(v, rules, columns, row_of):
-                found.append(source)
-                waiting += identify_variables(source)
-        return found
-
-    def _sources(self, v, rules, columns, row_of):
-        """What defines one variable: a mark's rule, or the equation that is matched with it."""
-        rule = _rule_of(v, rules)
-        if rule is not None and rule.ctype is Complementarity:
-            return rule[v.index()]._args
-        if rule is not None:
-            return [c.body for c in self._data(rule) if any(u is v for u in identify_variables(c.body))]
-        return [self._rows[row_of[columns[v]]][0]] if v in columns and row_of[columns[v]] >= 0 else []
-
-
-def _is_model(constraint, apart):
-    return constraint not in apart and not constraint.local_name.endswith(DISCRETISATION)
-
-
-def _under_determined(incidence, row_of):
-    """Columns that an alternating path connects with an unmatched column (``row_of`` is -1 there)."""
-    column_of = {i: j for j, i in enumerate(row_of) if i >= 0}
-    by_column, loose = incidence.tocsc(), {j for j, i in enumerate(row_of) if i < 0}
-    waiting = list(loose)
-    while waiting:
-        j = waiting.pop()
-        for i in by_column.indices[by_column.indptr[j] : by_column.indptr[j + 1]]:
-            if column_of[i] not in loose:
-                loose.add(column_of[i])
-                waiting.append(column_of[i])
-    return loose

@@ -6,6 +6,7 @@ Does not apply: to complementarities without time.
 """
 
 import logging
+from collections import defaultdict
 from dataclasses import dataclass
 
 from pyomo.core import Block
@@ -87,7 +88,13 @@ def refuse_lists_of_times(block, times):
     """
     labels = set(times.wrt) - ({times.wrt.first()} if discretised(times.wrt) else set())
     for component in block.component_objects(Complementarity, active=True, descend_into=Block):
-        if labels <= {_only_time(data, times) for data in component.values() if times.time(data) is None}:
+        covered = defaultdict(set)
+        for data in component.values():
+            if times.time(data) is None:
+                variables = list(_variables(data))
+                at = {times.time(v) for v in variables} - {None}
+                covered[frozenset(id(v.parent_component()) for v in variables)] |= at if len(at) == 1 else set()
+        if any(found >= labels for found in covered.values()):
             raise FesdError(
                 component,
                 "conditions for every time that are not indexed by time: elements that move would not see their switches",
@@ -95,11 +102,9 @@ def refuse_lists_of_times(block, times):
             )
 
 
-def _only_time(condition, times):
-    """The time of all variables of a condition; None if they have several or none."""
+def _variables(condition):
     sides = (side for side in getattr(condition, '_args', None) or () if hasattr(side, 'is_expression_type'))
-    found = {times.time(v) for side in sides for v in identify_variables(side)} - {None}
-    return found.pop() if len(found) == 1 else None
+    return (v for side in sides for v in identify_variables(side))
 
 
 def read_families(conditions, continuity, times):

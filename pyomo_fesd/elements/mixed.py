@@ -20,6 +20,7 @@ from pyomo_fesd import marks
 from pyomo_fesd.complementarity import read
 from pyomo_fesd.elements.continuity import inner_label
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.values import finite
 
 PARTS = ('lower', 'upper')
 #: How far outside its bounds a fixed variable may stand, as everywhere in Pyomo.
@@ -96,7 +97,7 @@ def _declare(block, index):
 def _add(block, index, condition, smooth):
     """The pairs of one time; p and n are marked as continuous, or as free to jump."""
     p, n = block.p[index or None], block.n[index or None]
-    now = value(condition.F, exception=False) or 0.0
+    now = finite(condition.F)
     p.value, n.value = max(now, 0.0), max(-now, 0.0)
     block.split.add(index or None, condition.F == p - n)
     for part in (p, n):

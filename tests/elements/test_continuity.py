@@ -12,7 +12,7 @@ from pyomo.mpec import Complementarity, complements
 import pyomo_fesd
 from pyomo_fesd import FesdError, kink
 from pyomo_fesd.complementarity import read
-from pyomo_fesd.elements import continuity as module
+from pyomo_fesd.elements import equations as module
 from pyomo_fesd.elements.continuity import read_continuity
 from pyomo_fesd.elements.expansion import discretise
 from pyomo_fesd.timeindex import TimeIndex

@@ -114,6 +114,15 @@ def test_a_condition_at_the_end_alone_is_none_of_them():
     assert solve(move(m, 5, 2)).y.value == pytest.approx(0, abs=1e-9)
 
 
+def test_conditions_of_both_ends_are_none_of_them():
+    m = weir.build()
+    m.y = pyo.Var(bounds=(0, None), initialize=1)
+    m.ends = Complementarity(
+        [1, 2], rule=lambda m, k: complements(m.y, m.V[2]) if k == 2 else complements(m.V[0] >= 0, m.F[0] >= 0)
+    )
+    solve(move(m, 5, 2))
+
+
 # What is continuous
 
 
