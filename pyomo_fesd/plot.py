@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 
 from pyomo_fesd.elements.grid import read_grid
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.marks import is_generated
 from pyomo_fesd.timeindex import derivatives, find_continuous_set
 from pyomo_fesd.trajectory import element_lengths, row_of_label, switches, trajectory
 
@@ -54,7 +55,7 @@ def plot(model, wrt=None, names=None, units=None):
 
 def _states_and_multipliers(model, wrt, frame):
     """Names of the differential states, and of the Disjunctions that have multipliers."""
-    states = dict.fromkeys(d.get_state_var().name for d in derivatives(model, wrt))
+    states = dict.fromkeys(d.get_state_var().name for d in derivatives(model, wrt) if not is_generated(d))
     disjunctions = dict.fromkeys(c.split(': ')[0] for c in frame.columns if ': ' in c)
     return [*states, *disjunctions]
 

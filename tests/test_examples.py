@@ -2,6 +2,7 @@
 
 import importlib
 
+import flash
 import gas_liquid_tank
 import numpy as np
 import oscillator
@@ -22,6 +23,8 @@ RADAU, LEGENDRE = 'LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE'
         ('gas_liquid_tank', '9.354868539 s'),
         ('oscillator', 'The circle is crossed at t = 1.000'),
         ('saturating_valve', 't = 2.52605715: the valve follows'),
+        ('flash', 'It boils from 37.89257'),
+        ('projected_ellipse', 'time 0.42743'),
     ],
 )
 def test_example_says_what_it_found_and_draws(name, said, tmp_path, monkeypatch, capsys):
@@ -89,3 +92,24 @@ def test_oscillator_shows_the_order_of_the_scheme(scheme, ncp, numbers, order):
     # how the elements are shared between the two sides of the switch differs from grid to grid: a fit over three
     errors = [oscillator.error(oscillator.solve(N, ncp, scheme)[0]) for N in numbers]
     assert -np.polyfit(np.log(numbers), np.log(errors), 1)[0] > order - 0.5
+
+
+@pytest.mark.parametrize('start', [0.0, 0.5, 1.0])
+@pytest.mark.parametrize('scheme, ncp', [(RADAU, 1), (RADAU, 2), (LEGENDRE, 2)])
+def test_flash_finds_the_phases_to_1e_8_from_any_vapour_fraction(scheme, ncp, start):
+    m = flash.build()
+    m.v[...].set_value(start)
+    assert flash.solve(m, nfe=10, ncp=ncp, scheme=scheme).solver.stationarity == 'B'
+    boils, dry = pyomo_fesd.switches(m)
+    assert (boils.time, dry.time) == pytest.approx(flash.EXACT, abs=1e-8)
+    assert (boils.before, boils.after, dry.after) == ('at lower bound', 'between', 'at upper bound')
+
+
+def test_flash_has_the_times_of_the_reference():
+    assert flash.EXACT == pytest.approx((37.892580, 364.553654), abs=1e-6)
+
+
+def test_flash_is_smaller_than_with_three_modes():
+    small, large = (pyomo_fesd.report(flash.transform(build())) for build in (flash.build, flash.build_modes))
+    assert [small[name] for name in ('variables', 'constraints', 'pairs')] == [511, 410, 42]
+    assert [large[name] for name in ('variables', 'constraints', 'pairs')] == [757, 615, 63]

@@ -8,7 +8,7 @@ rule), Disjunctions step aside and get their new indices by their rule afterward
 import logging
 from contextlib import contextmanager
 
-from pyomo.common.collections import ComponentMap
+from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.common.gc_manager import PauseGC
 from pyomo.common.log import LoggingIntercept
 from pyomo.core import (
@@ -55,8 +55,13 @@ PLACES = (Block, Disjunct)
 SHOWN = 5
 
 
-def discretise(block, wrt, nfe, ncp, scheme):
-    """Put ``nfe`` elements of ``ncp`` points on ``wrt`` and expand everything over it; the same number in each stage.
+def discretise(block, wrt, shares, ncp, scheme, held=()):
+    """Put elements of ``ncp`` points on ``wrt``, ``shares`` of them in each control stage, and expand everything over it.
+
+    Parameters
+    ----------
+    held : list of components
+        controls whose new times get the value of their stage later
 
     Raises
     ------
@@ -65,11 +70,11 @@ def discretise(block, wrt, nfe, ncp, scheme):
     """
     _check(block, wrt)
     with restored_on_error(block, wrt), PauseGC():
-        inputs = _fixed_everywhere(block, wrt)
-        place_boundaries(wrt, nfe)
+        inputs = _fixed_everywhere(block, wrt, held)
+        place_boundaries(wrt, shares)
         try:
             with hybrid_expansion(block, wrt):
-                TransformationFactory('dae.collocation').apply_to(block, wrt=wrt, nfe=nfe, ncp=ncp, scheme=scheme)
+                TransformationFactory('dae.collocation').apply_to(block, wrt=wrt, nfe=sum(shares), ncp=ncp, scheme=scheme)
             _ask_missing_constraints(block, wrt)
         except KeyError as error:
             raise FesdError(
@@ -91,21 +96,21 @@ def _ask_missing_constraints(block, wrt):
                     component.rule(component.parent_block(), index)
 
 
-def place_boundaries(wrt, nfe):
-    """Divide each control stage (gap between the present points) into the same number of elements."""
+def place_boundaries(wrt, shares):
+    """Divide each control stage (gap between the present points) into elements of equal length."""
     stages = list(wrt)
-    each = nfe // (len(stages) - 1)
-    for left, right in zip(stages, stages[1:]):
+    for left, right, each in zip(stages, stages[1:], shares):
         for k in range(1, each):
             wrt.add(round(left + k * (right - left) / each, 6))
     wrt._fe = list(wrt)
     wrt.set_changed(True)
 
 
-def _fixed_everywhere(block, wrt):
+def _fixed_everywhere(block, wrt, held):
     """Names of variables over time that are fixed at all present points; states excepted, whose ends may both be given."""
-    states = ComponentMap((d.get_state_var(), None) for d in derivatives(block, wrt))
-    fixed = (v for v in block.component_data_objects(Var, descend_into=PLACES) if v.fixed and v.parent_component() not in states)
+    known = ComponentSet([*(d.get_state_var() for d in derivatives(block, wrt)), *(v for u in held for v in (u, *u.values()))])
+    variables = block.component_data_objects(Var, descend_into=PLACES)
+    fixed = (v for v in variables if v.fixed and v not in known and v.parent_component() not in known)
     families = TimeIndex(wrt).families(fixed)
     return [strip_time(name) for name, family in families.items() if len(family) == len(wrt)]
 

@@ -5,12 +5,13 @@ A fixed Var counts with its declared bounds and a mutable Param as unknown: both
 
 from pyomo.common.errors import InfeasibleConstraintException, IntervalException
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
-from pyomo.core.expr.visitor import identify_mutable_parameters
+
+from pyomo_fesd.values import mutable_parameters
 
 
 def known_sign(z):
     """1 if z >= 0 wherever the declared bounds hold, -1 if z <= 0 there, 0 if they do not tell."""
-    if any(True for _ in identify_mutable_parameters(z)):
+    if any(True for _ in mutable_parameters(z)):
         return 0
     try:
         low, high = ExpressionBoundsVisitor().walk_expression(z)

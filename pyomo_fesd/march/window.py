@@ -12,8 +12,10 @@ Leaves: values.
 import pyomo.environ as pyo
 from pyomo.common.collections import ComponentSet
 from pyomo.core import ConstraintList, Objective, maximize
-from pyomo.core.expr.visitor import identify_mutable_parameters, identify_variables
+from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd.values import mutable_parameters
 
 #: Options of the small problems: a point that is not certified is judged by the march.
 OPTIONS = {'raise_exception_on_nonoptimal_result': False}
@@ -77,7 +79,7 @@ class Window:
         )
         self.unknown.update(more)
         fixed = [v for v in everything if v not in self.unknown]
-        params = ComponentSet(p for e in expressions if hasattr(e, 'args') for p in identify_mutable_parameters(e))
+        params = ComponentSet(p for e in expressions if hasattr(e, 'args') for p in mutable_parameters(e))
         self.parameters = [*fixed, *params]
         self.model = small_model(home, rows, pairs, self.unknown)
         self.model.step = Objective(expr=r, sense=maximize)

@@ -9,12 +9,11 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
-from pyomo_fesd import FesdError
 from pyomo_fesd.complementarity import read
 from pyomo_fesd.timeindex import TimeIndex
 from tests.models import dcs
 from tests.problems import relay_of_states, setpoint, sliding, weir
-from tests.problems.running import EXACT_SCHEMES, LEGENDRE, RADAU, SCHEMES, move, run, seen, solve, transform
+from tests.problems.running import EXACT_SCHEMES, LEGENDRE, RADAU, SCHEMES, move, run, solve, transform
 
 FORMS = ('element', 'stage', 'full')
 
@@ -151,16 +150,6 @@ def test_a_condition_that_is_switched_off_at_some_times_takes_no_part_there():
     m.overflow[1.0].deactivate()
     move(m)
     assert list(block(m).cross) == [('overflow', 1), ('overflow', 3), ('overflow', 4)]
-
-
-def test_two_bounds_on_one_side_over_time_are_refused():
-    m = weir.build()
-    m.z = pyo.Var(m.t, bounds=(0, 1))
-    m.valve = Complementarity(m.t, rule=lambda m, t: complements(pyo.inequality(0, m.z[t], 1), m.V[t] - 0.5))
-    before = seen(m)
-    with pytest.raises(FesdError, match=r'^valve\[0\]: .*two bounds on one side is not supported yet'):
-        move(m, 3)
-    assert seen(m) == before
 
 
 # Which points take part
