@@ -17,14 +17,17 @@ class Records(AutoSlots.Mixin):
     ----------
     repeats : list of (name, block, ContinuousSet, keywords)
         transformations applied before discretisation
+    rewrites : list of (name, block, ContinuousSet)
+        transformations whose ``rewrite`` an integrand has to pass, since it is built after them
     grids : ComponentMap ContinuousSet -> Block
         the block with the element lengths of each moving grid
     """
 
-    __slots__ = ('repeats', 'grids')
+    __slots__ = ('repeats', 'rewrites', 'grids')
 
     def __init__(self):
         self.repeats = []
+        self.rewrites = []
         self.grids = ComponentMap()
 
 
@@ -49,3 +52,18 @@ def repeat(block, wrt):
         if over is wrt:
             TransformationFactory(name).apply_to(where, wrt=wrt, **keywords)
     records(block).repeats = [r for r in repeats if r[2] is not wrt]
+
+
+def rewrite_integrands(block, name, wrt):
+    """Remember that integrands over ``wrt`` that are built from now on have to pass transformation ``name``."""
+    rewrites = records(block).rewrites
+    if not any(n == name and where is block and over is wrt for n, where, over in rewrites):
+        rewrites.append((name, block, wrt))
+
+
+def rewritten(integral, wrt, expression):
+    """An integrand of ``integral`` after all that it has to pass."""
+    for name, where, over in records(integral).rewrites:
+        if over is wrt:
+            expression = TransformationFactory(name).rewrite(where, wrt, expression, integral)
+    return expression

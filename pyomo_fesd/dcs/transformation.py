@@ -1,5 +1,6 @@
 """``fesd.dcs``: time-indexed Disjunctions become a dynamic complementarity system."""
 
+from contextlib import ExitStack
 from weakref import ref
 
 from pyomo.common.autoslots import AutoSlots
@@ -14,6 +15,7 @@ from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import marks, records
 from pyomo_fesd.dcs import stewart, two_mode
+from pyomo_fesd.dcs.pieces import Pieces, image, source
 from pyomo_fesd.dcs.system import Reader, refuse_logic_over_time
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
@@ -70,12 +72,22 @@ class DynamicComplementaritySystem(Transformation):
         for block in _blocks(instance, config.targets):
             refuse_logic_over_time(block, times.time)
         reader = Reader(derivatives(instance.model(), wrt), times)
-        with PauseGC():
+        with PauseGC(), ExitStack() as undo:
+            Pieces(_one_block(instance), times, undo).replace_all(_blocks(instance, config.targets))
             systems = [reader.read(d) for d in found]
             forms = [self._form(config.form, system) for system in systems]
+            undo.pop_all()
             for system, form in zip(systems, forms):
                 _add(system, form)
         records.repeat_after_expansion(instance, 'fesd.dcs', wrt, targets=config.targets, form=config.form)
+        records.rewrite_integrands(instance, 'fesd.dcs', wrt)
+
+    def rewrite(self, instance, wrt, expression, owner):
+        """``expression`` with its functions in pieces replaced: the integrand of ``owner``, which is built after this."""
+        with ExitStack() as undo:
+            expression = Pieces(_one_block(instance), TimeIndex(wrt), undo).replaced(expression, owner)
+            undo.pop_all()
+        return expression
 
     @staticmethod
     def _form(wanted, system):
@@ -101,14 +113,23 @@ class DynamicComplementaritySystem(Transformation):
         return _maps(component).disjunct[component]
 
     def get_src_constraint(self, component):
-        """The constraints of the disjuncts that a generated constraint blends (a list, one or more for each mode)."""
-        return _maps(component).sources[component]
+        """The constraints of the disjuncts that a generated constraint blends (a list, one or more for each mode).
+
+        For the image of a constraint or a Piecewise outside disjuncts, a list of this one.
+        """
+        alone = source(component)
+        return _maps(component).sources[component] if alone is None else [alone]
 
     def get_transformed_constraints(self, constraint):
-        """The generated constraints that took the place of a disjunct's ``constraint``."""
+        """The generated constraints that took the place of a ``constraint`` of a disjunct, or of one with functions in pieces."""
+        alone = image(constraint)
+        if alone is not None:
+            return [alone]
         disjunct = constraint.parent_block()
-        while disjunct.ctype is not Disjunct:
+        while disjunct is not None and disjunct.ctype is not Disjunct:
             disjunct = disjunct.parent_block()
+        if disjunct is None:
+            return []
         block = disjunct.transformation_block
         return [] if block is None else block.private_data('pyomo_fesd.dcs').images.get(constraint, [])
 
@@ -136,6 +157,11 @@ Block.register_private_data_initializer(_Maps, scope='pyomo_fesd.dcs')
 
 def _maps(component):
     return component.parent_block().private_data('pyomo_fesd.dcs')
+
+
+def _one_block(instance):
+    """The block that holds what belongs to all of ``instance``."""
+    return instance if isinstance(instance, BlockData) else instance.parent_block()
 
 
 def _blocks(instance, targets):

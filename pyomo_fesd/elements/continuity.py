@@ -89,10 +89,10 @@ def _closure(start, rules, held, equations):
     known.update(v for v, rule in rules.items() if rule.ctype is Constraint and not _mentions(rule, held))
     if equations is None:
         return known
-    kinks = [(v, rule) for v, rule in rules.items() if rule.ctype is Complementarity and equations.here(v)]
+    kinks = [kink for v, rule in rules.items() if rule.ctype is Complementarity for kink in equations.kinks(v, rule)]
     while True:
         known.update(equations.tied(known))
-        ready = [v for v, rule in kinks if v not in known and all(u is s or _in(u, known) for s, u in equations.kink(v, rule))]
+        ready = [s for s, variables in kinks if s not in known and all(_in(v, known) for v in variables)]
         if not ready:
             return known
         known.update(ready)
@@ -117,18 +117,12 @@ class _Equations:
             if c.equality and times.time(c) == self._label and not c.parent_component().local_name.endswith(DISCRETISATION)
         ]
 
-    def here(self, component):
-        """Whether a marked component has data at this time."""
-        return any(True for _ in self._data(component))
-
-    def _data(self, component):
-        return (v for v in component.values() if self._times.time(v) == self._label)
-
-    def kink(self, component, condition):
-        """``(s, variable)`` for every variable of the conditions that define s = max(0, z) at this time."""
-        for s in self._data(component):
-            for side in condition[s.index()]._args:
-                yield from ((s, v) for v in identify_variables(side, include_fixed=True))
+    def kinks(self, component, condition):
+        """``(s, variables of z)`` for every s = max(0, z) of a marked component at this time."""
+        for index, s in component.items():
+            # pyomo.dae gives a Var all its indices, also those without a condition
+            if index in condition and self._times.time(s) == self._label:
+                yield s, [v for side in condition[index]._args for v in identify_variables(side, include_fixed=True) if v is not s]
 
     def tied(self, known):
         """Variables that equations tie to known ones.

@@ -136,21 +136,22 @@ class FiniteElements(Transformation):
             stages = self._discretise(instance, wrt, config)
             grid = read_grid(wrt, stages)
             check_orders(instance.model(), wrt)
+            block = self._block(instance, wrt)
+            add_lengths(block, grid, config.length_bounds)
+            integrands = [(i, integrand(i, wrt)) for i in integrals(instance.model(), wrt)]
+            for integral, rule in integrands:
+                # first of all: functions in pieces inside an integrand have conditions of their own
+                rebuild(integral, rule, block, grid)
             families = read_families(instance, wrt, config.piecewise_constant, config.continuous)
             waiting = next(_active_disjunctions(instance, wrt), None)
             if waiting is not None and not families:
                 raise FesdError(
                     waiting, "an active Disjunction over time", "apply fesd.dcs first: its complementarity finds the switches"
                 )
-            integrands = [(i, integrand(i)) for i in integrals(instance.model(), wrt)]
             warn_explicit_time(instance, wrt, grid, integrands)
             if not grid.right_is_stage:
                 warn_gauss_on_curved_surfaces(families)
 
-            block = self._block(instance, wrt)
-            add_lengths(block, grid, config.length_bounds)
-            for integral, rule in integrands:
-                rebuild(integral, rule, block, grid)
             hold_controls(block, config.piecewise_constant, grid, wrt)
             multiply_derivatives(instance.model(), wrt, block, grid)
             add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
