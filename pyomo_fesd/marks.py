@@ -6,10 +6,12 @@ A mark is a ``Suffix(direction=LOCAL)`` with one of the names below on the block
 =================  ========================  ===========================================================================
 mark               on                        value
 =================  ========================  ===========================================================================
-CONTINUOUS         Var                       the Constraint (of lam, mu, p, n) or Complementarity (of a kink's s) that ties it to the
-                                             states: continuous in time where the quantity that switches is
+CONTINUOUS         Var                       the Constraint (of lam, mu, p, n) or Complementarity (of a kink's s) that ties it to
+                                             the states: continuous in time where the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
+SIDES              Var                       (name, {side: expression}) of the surface that it belongs to: positive where the
+                                             quantity is on this side
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
 ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
                                              certificate looks beyond them
@@ -22,6 +24,7 @@ from pyomo.core import Block, Suffix
 CONTINUOUS = 'fesd_continuous'
 SELECTOR = 'fesd_selector'
 INDICATOR = 'fesd_indicator'
+SIDES = 'fesd_sides'
 DECIDED = 'fesd_decided'
 ARTIFICIAL = 'fesd_artificial'
 PENALTY = 'fesd_penalty'

@@ -26,8 +26,8 @@ class _Known(AutoSlots.Mixin):
     ----------
     entries : dict (kind, time) -> list of (key, Block)
         the quantities at each time
-    names : dict text -> list of str
-        names of the blocks of the quantities with that text
+    names : dict (kind, text) -> list of str
+        names of the blocks of the quantities with that text, of which there may be several at one time
     """
 
     __slots__ = ('entries', 'names')
@@ -65,20 +65,29 @@ class Home:
         """All ``(key, block)`` of one kind at one time."""
         return self._known().entries.get((kind, time), ())
 
-    def new(self, kind, time, key, *quantities):
-        """The block for a new ``key`` at ``time``: that of the same quantities at other times, or a new one."""
-        known, text = self._known(), self.text(*quantities)
+    def new(self, kind, time, key, text):
+        """The block for a new ``key`` at ``time``: that of the quantity with the same text at other times, or a new one."""
+        known = self._known()
         here = known.entries.setdefault((kind, time), [])
         taken = [block.local_name for _, block in here]
-        name = next((n for n in known.names.get(text, ()) if n not in taken), None) or self._declare(text)
-        here.append((key, self._block().component(name)))
+        free = (n for n in known.names.get((kind, text), ()) if n not in taken)
+        block = self._block().component(next(free, None) or self._declare(kind, text))
+        here.append((key, block))
         self.undo.callback(here.pop)
-        return self._block().component(name)
+        return block
 
-    def text(self, *quantities):
-        """Quantities in words, the same at all times."""
-        words = (expression_to_string(q, labeler=lambda c: strip_time(self.times.split(c)[1])) for q in quantities)
-        return ', '.join(words).replace(f'{self.NAME}.', '')
+    def blocks(self):
+        """The blocks of all quantities."""
+        home = self._instance.component(self.NAME)
+        return home.component_objects(Block, descend_into=False) if home is not None else ()
+
+    def name(self, component):
+        """The name of a component, the same at all times."""
+        return strip_time(self.times.split(component)[1]).removeprefix(f'{self.NAME}.')
+
+    def text(self, q):
+        """A quantity in words, the same at all times."""
+        return expression_to_string(q, labeler=self.name)
 
     def part(self, block, name, declare):
         """Component ``name`` of the block of a quantity; made by ``declare()`` and added at its first time."""
@@ -93,7 +102,7 @@ class Home:
     def _block(self):
         return self.part(self._instance, self.NAME, Block)
 
-    def _declare(self, text):
+    def _declare(self, kind, text):
         block, known = self._block(), self._known()
         plain = re.sub(r'\W+', '_', text).strip('_')[:LONGEST_NAME] or 'quantity'
         name, number = plain, 1
@@ -101,8 +110,8 @@ class Home:
             number += 1
             name = f'{plain}_{number}'
         self.part(block, name, Block).doc = text
-        known.names.setdefault(text, []).append(name)
-        self.undo.callback(known.names[text].remove, name)
+        known.names.setdefault((kind, text), []).append(name)
+        self.undo.callback(known.names[kind, text].remove, name)
         return name
 
 
@@ -110,7 +119,7 @@ def forget(block, index):
     """Take what stands at ``index`` (the beginning of an index) out of the components of a block, and its marks."""
     gone = ComponentSet()
     for component in block.component_objects((Var, Constraint, Complementarity), descend_into=False):
-        for key in [key for key in component._data if key[: len(index)] == index]:
+        for key in [key for key in component._data if (key if isinstance(key, tuple) else (key,))[: len(index)] == index]:
             gone.add(component._data.pop(key))
     for suffix in block.component_objects(Suffix, descend_into=False):
         for component in [component for component in suffix if component in gone]:

@@ -51,21 +51,30 @@ class Mesh:
         self.vertices, self.simplices = triangulation
         points = np.array(self.vertices)
         self.corner, self.size = points.min(axis=0), np.ptp(points, axis=0)
-        self.unit = (points - self.corner) / self.size
+        self.unit = self.local(points)
         corners = np.swapaxes(self.unit[np.array(self.simplices)], 1, 2)
         self._matrices = np.concatenate([corners, np.ones((len(corners), 1, corners.shape[2]))], axis=1)
         self._refuse_holes(source)
         self.heights = self._heights(source)
+        #: for each simplex the affine function through its heights: a, then b; the mesh is the largest of them
+        self.planes = np.stack([np.linalg.solve(M.T, self.heights[list(s)]) for M, s in zip(self._matrices, self.simplices)])
+
+    def local(self, x):
+        """Coordinates in the unit cube; x may hold expressions."""
+        return (x - self.corner) / self.size
 
     def at(self, x):
         """The simplex at or nearest to x, its weights among those of all vertices, and its slope: a, then b."""
-        local = (np.array(x, dtype=float) - self.corner) / self.size
-        weights = np.linalg.solve(self._matrices, np.append(local, 1.0)[:, None])[:, :, 0]
+        weights = np.linalg.solve(self._matrices, np.append(self.local(x), 1.0)[:, None])[:, :, 0]
         number = int(weights.min(axis=1).argmax())
         simplex = list(self.simplices[number])
         w = np.zeros(len(self.unit))
         w[simplex] = np.clip(weights[number], 0, 1)
-        return simplex, w, np.linalg.solve(self._matrices[number].T, self.heights[simplex])
+        return simplex, w, self.planes[number]
+
+    def facets(self):
+        """The sides of the domain, each as numbers c, e with ``c^T x + e <= 0`` inside."""
+        return np.unique(ConvexHull(self.unit).equations.round(12), axis=0)
 
     def _refuse_holes(self, source):
         dimension = len(self.size)

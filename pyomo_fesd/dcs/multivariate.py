@@ -9,13 +9,13 @@ With a and b, the multipliers of the equations, the optimality conditions of thi
 
     phi_v - a^T v - b - lam_v = 0,    0 <= w_v  perp  lam_v >= 0        and        y = sum_v w_v y_v
 
-The weights are continuous where x is, and so is y.  x cannot leave the domain.  (Stewart's program, eq. 3, chooses among the
-simplices, of which there are more than vertices: twice as many in the plane, six times in space.)
+The weights are continuous where x is, and so is y.  x cannot leave the domain.  Stewart's program (simplices.py) has a pair for
+each simplex, of which there are more than vertices: twice as many in the plane, six times in space.
 
 Takes: a ``PiecewiseLinearFunction`` of several arguments that depend on time.
 Leaves: ``w``, ``lam``, ``slope`` (a, then b), ``stationarity``, ``combination`` and ``complementarity`` over time and vertex, once
     for all functions with the same simplices and arguments; coordinates v are those of the unit cube around the domain.
-Does not apply: to functions that jump from one simplex to the next, and to triangulations that are not regular.
+Does not apply: to functions that jump from one simplex to the next (simplices.py); to triangulations that are not regular.
 """
 
 import numpy as np
@@ -24,6 +24,7 @@ from pyomo.core.expr.compare import compare_expressions
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
+from pyomo_fesd.dcs import simplices
 from pyomo_fesd.dcs.home import forget
 from pyomo_fesd.dcs.mesh import Mesh
 from pyomo_fesd.dcs.regions import value_now
@@ -37,8 +38,11 @@ def call(node, args, place):
     """The value of a PiecewiseLinearFunction of several arguments."""
     function = node.pw_linear_function
     mesh = place.cached(Mesh, _triangulation(function), function)
-    w = _weights(mesh, args, place)
-    return sum(w_v * y for w_v, y in zip(w, _values(function, mesh)) if y)
+    values = _values(function, mesh)
+    text = f'{place.home.name(function)}({", ".join(map(place.home.text, args))})'
+    if values is None:
+        return simplices.choose(function, text, mesh, args, place)
+    return sum(w * y for w, y in zip(_weights(text, mesh, args, place), values) if y)
 
 
 def _triangulation(function):
@@ -50,46 +54,39 @@ def _triangulation(function):
 
 
 def _values(function, mesh):
-    """y_v of every vertex.
+    """y_v of every vertex; None where the functions on two simplices disagree.
 
     Raises
     ------
     FesdError
-        where the functions on two simplices disagree, or where one is not linear
+        where a function is not linear
     """
-    points, simplices = np.array(mesh.vertices), np.array(mesh.simplices)
-    corners = np.array([[value(f(*x)) for x in points[s]] for s, f in zip(simplices, function._linear_functions)], dtype=float)
-    middles = [value(f(*points[s].mean(axis=0))) for s, f in zip(simplices, function._linear_functions)]
+    points, members = np.array(mesh.vertices), np.array(mesh.simplices)
+    pieces = list(zip(members, function._linear_functions))
+    corners = np.array([[value(f(*x)) for x in points[simplex]] for simplex, f in pieces], dtype=float)
+    middles = [value(f(*points[simplex].mean(axis=0))) for simplex, f in pieces]
     rounding = ROUNDING * np.abs(corners).max()
-    bent = np.abs(corners.mean(axis=1) - middles) > rounding
-    if bent.any():
-        raise FesdError(
-            function,
-            f"its function on the simplex of {_names(points[simplices[bent.argmax()]])} is not linear",
-            "give linear functions; curved pieces belong into a Disjunction",
-        )
-    found = {}
-    for v, y in zip(simplices.flat, corners.flat):
-        if abs(found.setdefault(v, y) - y) > rounding:
+    for (simplex, _), mean, middle in zip(pieces, corners.mean(axis=1), middles):
+        if abs(mean - middle) > rounding:
+            where = ', '.join(str(tuple(map(float, x))) for x in points[simplex])
             raise FesdError(
                 function,
-                f"it jumps: at {_names(points[[v]])} it is {found[v]:g} on one simplex and {y:g} on another",
-                "write pieces that do not meet as a Disjunction, one disjunct for each",
+                f"its function on the simplex of {where} is not linear",
+                "give linear functions; curved pieces belong into a Disjunction",
             )
+    found = {}
+    if any(abs(found.setdefault(v, y) - y) > rounding for v, y in zip(members.flat, corners.flat)):
+        return None
     return [float(found[v]) for v in range(len(points))]
 
 
-def _names(points):
-    return ', '.join(str(tuple(map(float, p))) for p in points)
-
-
-def _weights(mesh, args, place):
+def _weights(text, mesh, args, place):
     """w of every vertex; those that are there already, where the arguments are the same."""
     home, time = place.home, place.time
     for (known, *others), block in home.entries('mesh', time):
         if known == mesh.triangulation and all(compare_expressions(a, b) for a, b in zip(args, others)):
             return [block.w[time, k] for k in block.vertices]
-    block = home.new('mesh', time, (mesh.triangulation, *args), *args)
+    block = home.new('mesh', time, (mesh.triangulation, *args), text)
     if block.component('w') is None:
         _declare(block, home.wrt, mesh)
     home.undo.callback(forget, block, (time,))
@@ -133,4 +130,4 @@ def _combined(block, time, mesh, axis):
 
 
 def _right_hand_side(args, mesh, axis):
-    return (args[axis] - float(mesh.corner[axis])) / float(mesh.size[axis]) if axis < len(mesh.size) else 1
+    return mesh.local(args)[axis] if axis < len(mesh.size) else 1

@@ -21,7 +21,7 @@ from pyomo.core import Block, Constraint, Objective
 from pyomo.core.expr import Expr_ifExpression, identify_variables
 from pyomo.core.expr.visitor import ExpressionReplacementVisitor
 from pyomo.dae import Integral
-from pyomo.gdp import Disjunct
+from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
@@ -42,6 +42,8 @@ def _call(node, args, place):
 RULES = {PiecewiseLinearExpression: _call, Expr_ifExpression: conditional.call}
 PLACES = (Block, Disjunct)
 IMAGES = marks.GENERATED + 'images'
+#: Beginning of the names of the blocks of contrib.piecewise's transformations.
+WRITTEN_BY_PYOMO = '_pyomo_contrib_pw_linear'
 
 
 class _Maps(AutoSlots.Mixin):
@@ -80,12 +82,14 @@ class Pieces:
     def replace_all(self, blocks):
         """Replace everything below ``blocks``."""
         for block in blocks:
+            _refuse_written_by_pyomo(block, self.times)
             for source in list(_piecewise(block)):
                 if self.times.time(source) is not None:
                     self._write_image(source, piecewise.relation(source, Place(self, source, self.times.time(source))))
             for source in list(_sources(block)):
                 if _contains(source, self.times.wrt):
                     WRITERS[source.ctype](self, source)
+        self.surfaces.warn_explicit_time()
 
     def replaced(self, expression, owner):
         """``expression`` with expressions in the place of its functions; named Expressions in it are changed."""
@@ -150,6 +154,27 @@ def image(source):
 def source(image):
     """The Constraint or Piecewise that an image stands for; None for other components."""
     return image.parent_block().private_data('pyomo_fesd.dcs.pieces').sources.get(image)
+
+
+def _refuse_written_by_pyomo(block, times):
+    """Pyomo's own Disjunctions of a function in pieces say nothing of points outside its domain: no partition."""
+    for disjunction in block.component_data_objects(Disjunction, active=True, descend_into=Block):
+        above = disjunction.parent_block()
+        while above is not None and not above.local_name.startswith(WRITTEN_BY_PYOMO):
+            above = above.parent_block()
+        if above is not None and any(times.time(v) is not None for v in _variables(disjunction)):
+            raise FesdError(
+                disjunction,
+                "a transformation of contrib.piecewise has written a PiecewiseLinearFunction over time as this Disjunction, whose "
+                "regions do not fill the state space",
+                "leave that out: fesd.dcs takes the PiecewiseLinearFunction itself",
+            )
+
+
+def _variables(disjunction):
+    for disjunct in disjunction.disjuncts:
+        for constraint in disjunct.component_data_objects(Constraint, descend_into=Block):
+            yield from identify_variables(constraint.body)
 
 
 def _piecewise(block):

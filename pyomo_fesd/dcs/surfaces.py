@@ -11,18 +11,28 @@ Leaves: a block for each quantity, in it ``kink`` and ``step`` over time and lev
 Does not apply: without time.
 """
 
+import logging
+from bisect import bisect_left
+
 import numpy as np
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Constraint, Set
 from pyomo.core.expr.visitor import identify_mutable_parameters, identify_variables
 
-from pyomo_fesd import kink
+from pyomo_fesd import kink, marks
 from pyomo_fesd.dcs import step
 from pyomo_fesd.dcs.home import forget
 from pyomo_fesd.dcs.regions import PROPORTIONAL, value_now
+from pyomo_fesd.timeindex import discretised
+
+logger = logging.getLogger('pyomo_fesd')
 
 #: Random points at which two quantities are compared.
 POINTS = 5
+#: What a level may be.
+KINDS = ('kink', 'step')
+#: Keeps a share of two parts defined where both vanish.
+TINY = 1e-12
 
 
 class Surfaces:
@@ -50,6 +60,8 @@ class Surfaces:
         if (time, b) not in steps.switching:
             self._home.undo.callback(forget, steps, (time, b))
             step.add(steps, (time, b), _difference(known, b))
+            alpha = steps.alpha[time, b]
+            marks.mark(steps, marks.SIDES, alpha, (f'{block.doc} = {b:g}', {'below': 1 - alpha, 'above': alpha}))
         alpha = steps.alpha[time, b]
         return alpha if factor * sign > 0 else 1 - alpha
 
@@ -72,12 +84,30 @@ class Surfaces:
         relation = _affine(values, others - level)
         return relation[0] if relation is not None and relation[1] == 0 else None
 
+    def warn_explicit_time(self):
+        """Levels that differ from point to point of an element depend on the time label, which is not physical time."""
+        for block in self._home.blocks() if discretised(self._home.wrt) else ():
+            for name in KINDS:
+                part = block.component(name)
+                if part is not None and _differs_inside_elements(part.complementarity, self._home.wrt):
+                    logger.warning(
+                        "%s: its breakpoints or conditions depend on the time label (a Param over time, or t itself in a rule). "
+                        "Labels are not physical time once elements move. Use a clock state: a Var with derivative 1 that "
+                        "starts at the first time.",
+                        block.doc,
+                    )
+
     def _kink(self, block, time, q, level):
         kinks = self._levels(block, 'kink', kink, level)
         if (time, level) in kinks.complementarity:
             return kinks.s[time, level]
         self._home.undo.callback(forget, kinks, (time, level))
-        return kink.add(kinks, (time, level), _difference(q, level))
+        s = kink.add(kinks, (time, level), _difference(q, level))
+        n = s - _difference(q, level)
+        # shares of both, so that their units do not matter
+        sides = {'below': n / (s + n + TINY), 'above': s / (s + n + TINY)}
+        marks.mark(kinks, marks.SIDES, s, (f'{block.doc} = {level:g}', sides))
+        return s
 
     def _levels(self, block, name, primitive, level):
         """The sub-block of all kinks, or all steps, of a quantity, with ``level`` among its levels."""
@@ -101,7 +131,7 @@ class Surfaces:
         if not found:
             related = ((known, block, self._relation(q, known)) for known, block in here)
             found = [(known, block, *relation) for known, block, relation in related if relation is not None]
-        known, block, factor, shift = found[0] if found else (q, self._home.new('surface', time, q, q), 1.0, 0.0)
+        known, block, factor, shift = found[0] if found else (q, self._home.new('surface', time, q, self._home.text(q)), 1.0, 0.0)
         return block, known, factor, _as_known(block, (level - shift) / factor, max(abs(level), abs(shift)) / abs(factor))
 
     def _relation(self, q, known):
@@ -111,6 +141,17 @@ class Surfaces:
         if values is None or others is None or _parameters(q) != _parameters(known):
             return None
         return _affine(values, others)
+
+
+def _differs_inside_elements(conditions, wrt):
+    """Whether two points of one finite element, its left boundary apart, have conditions at different levels."""
+    levels = {}
+    for time, level, *_ in conditions:
+        levels.setdefault(time, set()).add(level)
+    boundaries, elements = wrt.get_finite_elements(), {}
+    for time, here in levels.items():
+        elements.setdefault(bisect_left(boundaries, time), []).append(here)
+    return any(here != element[0] for element in elements.values() for here in element)
 
 
 class Samples:
@@ -166,7 +207,7 @@ def _short(number):
 
 def _as_known(block, level, scale):
     """A level as its quantity has it already, if it differs by rounding only."""
-    known = (b for name in ('kink', 'step') if block.component(name) is not None for b in block.component(name).levels)
+    known = (b for name in KINDS if block.component(name) is not None for b in block.component(name).levels)
     return next((b for b in known if abs(b - level) <= PROPORTIONAL * scale), float(_short(level)))
 
 

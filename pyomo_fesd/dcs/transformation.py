@@ -73,7 +73,8 @@ class DynamicComplementaritySystem(Transformation):
             refuse_logic_over_time(block, times.time)
         reader = Reader(derivatives(instance.model(), wrt), times)
         with PauseGC(), ExitStack() as undo:
-            Pieces(_one_block(instance), times, undo).replace_all(_blocks(instance, config.targets))
+            inside = [disjunct for d in found if config.targets for disjunct in d.disjuncts if disjunct.active]
+            Pieces(_one_block(instance), times, undo).replace_all([*_blocks(instance, config.targets), *inside])
             systems = [reader.read(d) for d in found]
             forms = [self._form(config.form, system) for system in systems]
             undo.pop_all()
@@ -117,19 +118,19 @@ class DynamicComplementaritySystem(Transformation):
 
         For the image of a constraint or a Piecewise outside disjuncts, a list of this one.
         """
-        alone = source(component)
-        return _maps(component).sources[component] if alone is None else [alone]
+        if source(component) is not None:
+            return [source(component)]
+        return [con if source(con) is None else source(con) for con in _maps(component).sources[component]]
 
     def get_transformed_constraints(self, constraint):
         """The generated constraints that took the place of a ``constraint`` of a disjunct, or of one with functions in pieces."""
         alone = image(constraint)
-        if alone is not None:
-            return [alone]
+        constraint = constraint if alone is None else alone
         disjunct = constraint.parent_block()
         while disjunct is not None and disjunct.ctype is not Disjunct:
             disjunct = disjunct.parent_block()
         if disjunct is None:
-            return []
+            return [] if alone is None else [alone]
         block = disjunct.transformation_block
         return [] if block is None else block.private_data('pyomo_fesd.dcs').images.get(constraint, [])
 
