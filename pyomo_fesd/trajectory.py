@@ -114,7 +114,8 @@ def trajectory(model, wrt=None):
 def _number(expr):
     try:
         result = None if expr is None else value(expr, exception=False)
-    except (ArithmeticError, ValueError):
+    except (ArithmeticError, ValueError, NotImplementedError):
+        # Pyomo cannot evaluate a PiecewiseLinearFunction
         result = None
     return np.nan if result is None or isinstance(result, complex) else result
 

@@ -16,7 +16,7 @@ Does not apply: where neither the component nor the arguments are over time.
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.common.numeric_types import native_types
-from pyomo.contrib.piecewise.piecewise_linear_expression import PiecewiseLinearExpression
+from pyomo.contrib.piecewise import PiecewiseLinearExpression, PiecewiseLinearFunction
 from pyomo.core import Block, Constraint, Objective
 from pyomo.core.expr import Expr_ifExpression, identify_variables
 from pyomo.core.expr.visitor import ExpressionReplacementVisitor
@@ -33,8 +33,7 @@ from pyomo_fesd.timeindex import DISCRETISATION, derivatives, discretised
 
 
 def _call(node, args, place):
-    """The value of a PiecewiseLinearFunction, which is switched off as Pyomo's own transformations do it."""
-    place.switch_off(node.pw_linear_function)
+    """The value of a PiecewiseLinearFunction."""
     return (piecewise if len(args) == 1 else multivariate).call(node, args, place)
 
 
@@ -89,11 +88,23 @@ class Pieces:
             for source in list(_sources(block)):
                 if _contains(source, self.times.wrt):
                     WRITERS[source.ctype](self, source)
+            for function in block.component_data_objects(PiecewiseLinearFunction, active=True, descend_into=PLACES):
+                if any(self._time(call) is not None for call in function._expressions.values()):
+                    self.switch_off(function)
         self.surfaces.warn_explicit_time()
 
     def replaced(self, expression, owner):
         """``expression`` with expressions in the place of its functions; named Expressions in it are changed."""
         return _Rewriter(self, owner).walk_expression(expression)
+
+    def time(self, owner, node):
+        """The time of ``owner``, or the last one that occurs in a node of it: an Integral is not over time itself."""
+        time = self.times.time(owner)
+        return self._time(node) if time is None else time
+
+    def _time(self, expression):
+        labels = (self.times.time(v) for v in identify_variables(expression, include_fixed=True))
+        return max((t for t in labels if t is not None), default=None)
 
     def write_constraint(self, source):
         """Replace in a Constraint."""
@@ -216,7 +227,7 @@ class Place:
 
     def __init__(self, pieces, owner, time):
         self._pieces, self.owner, self.time = pieces, owner, time
-        self.home, self.switch_off = pieces.home, pieces.switch_off
+        self.home = pieces.home
 
     def positive_part(self, q, level):
         """max(0, q - level)."""
@@ -280,17 +291,9 @@ class _Rewriter(ExpressionReplacementVisitor):
     def exitNode(self, node, data):
         changed, args, _ = data
         if node.__class__ in RULES:
-            time = self._time(node)
+            time = self._pieces.time(self._owner, node)
             return node if time is None else RULES[node.__class__](node, args, Place(self._pieces, self._owner, time))
         if node.is_named_expression_type():
             self._pieces.set(node, args[0])
             return node
         return super().exitNode(node, data)
-
-    def _time(self, node):
-        """The time of the owner, or the last one that occurs in the node: an Integral is not over time itself."""
-        time = self._pieces.times.time(self._owner)
-        if time is not None:
-            return time
-        labels = (self._pieces.times.time(v) for v in identify_variables(node, include_fixed=True))
-        return max((t for t in labels if t is not None), default=None)

@@ -75,7 +75,8 @@ def read_continuity(model, times, held, told, trace):
         whether algebraic variables matter: they do not where ``fesd.dcs`` wrote every condition
     """
     rules = ComponentMap(marks.marked(model, marks.CONTINUOUS))
-    equations = _Equations(model, times) if trace or any(r.ctype is Complementarity for r in rules.values()) else None
+    kinks = [(v, rule) for v, rule in rules.items() if rule.ctype is Complementarity]
+    equations = _Equations(model, times, kinks) if trace or kinks else None
     start = ComponentSet(d.get_state_var() for d in derivatives(model, times.wrt))
     start.update(told)
     across = _closure(start, rules, held, equations)
@@ -87,15 +88,9 @@ def _closure(start, rules, held, equations):
     """``start`` and all that follows from it; nothing that contains a held control does."""
     known = ComponentSet(start)
     known.update(v for v, rule in rules.items() if rule.ctype is Constraint and not _mentions(rule, held))
-    if equations is None:
-        return known
-    kinks = [kink for v, rule in rules.items() if rule.ctype is Complementarity for kink in equations.kinks(v, rule)]
-    while True:
+    if equations is not None:
         known.update(equations.tied(known))
-        ready = [s for s, variables in kinks if s not in known and all(_in(v, known) for v in variables)]
-        if not ready:
-            return known
-        known.update(ready)
+    return known
 
 
 def _mentions(rule, components):
@@ -105,24 +100,25 @@ def _mentions(rule, components):
 
 
 class _Equations:
-    """The algebraic equations of one inner time, as lists of the variables that they contain."""
+    """The algebraic equations of one inner time, as lists of the variables that they contain.
 
-    def __init__(self, model, times):
-        self._times = times
-        self._label = list(times.wrt)[1]
+    A kink is one of them: its condition says s = max(0, z).  So it may be part of an implicit equation for z.
+    """
+
+    def __init__(self, model, times, kinks):
+        label = list(times.wrt)[1]
         constraints = model.component_data_objects(Constraint, active=True, descend_into=Block)
-        self._rows = [
-            [v for v in identify_variables(c.body) if times.time(v) is not None]
+        equations = [
+            [c.body]
             for c in constraints
-            if c.equality and times.time(c) == self._label and not c.parent_component().local_name.endswith(DISCRETISATION)
+            if c.equality and times.time(c) == label and not c.parent_component().local_name.endswith(DISCRETISATION)
         ]
-
-    def kinks(self, component, condition):
-        """``(s, variables of z)`` for every s = max(0, z) of a marked component at this time."""
-        for index, s in component.items():
-            # pyomo.dae gives a Var all its indices, also those without a condition
-            if index in condition and self._times.time(s) == self._label:
-                yield s, [v for side in condition[index]._args for v in identify_variables(side, include_fixed=True) if v is not s]
+        # pyomo.dae gives a Var all its indices, also those without a condition
+        conditions = [rule[i] for v, rule in kinks for i, s in v.items() if i in rule and times.time(s) == label]
+        self._rows = [
+            [v for v in ComponentSet(v for e in row for v in identify_variables(e)) if times.time(v) is not None]
+            for row in (*equations, *(c._args for c in conditions))
+        ]
 
     def tied(self, known):
         """Variables that equations tie to known ones.
