@@ -33,7 +33,8 @@ from pyomo_fesd.timeindex import DISCRETISATION, derivatives, discretised
 
 
 def _call(node, args, place):
-    """The value of a PiecewiseLinearFunction."""
+    """The value of a PiecewiseLinearFunction, which is switched off as Pyomo's own transformations do it."""
+    place.switch_off(node.pw_linear_function)
     return (piecewise if len(args) == 1 else multivariate).call(node, args, place)
 
 
@@ -227,7 +228,7 @@ class Place:
 
     def __init__(self, pieces, owner, time):
         self._pieces, self.owner, self.time = pieces, owner, time
-        self.home = pieces.home
+        self.home, self.switch_off = pieces.home, pieces.switch_off
 
     def positive_part(self, q, level):
         """max(0, q - level)."""

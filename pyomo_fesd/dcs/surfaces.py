@@ -31,8 +31,6 @@ logger = logging.getLogger('pyomo_fesd')
 POINTS = 5
 #: What a level may be.
 KINDS = ('kink', 'step')
-#: Keeps a share of two parts defined where both vanish.
-TINY = 1e-12
 
 
 class Surfaces:
@@ -103,9 +101,8 @@ class Surfaces:
             return kinks.s[time, level]
         self._home.undo.callback(forget, kinks, (time, level))
         s = kink.add(kinks, (time, level), _difference(q, level))
-        n = s - _difference(q, level)
-        # shares of both, so that their units do not matter
-        sides = {'below': n / (s + n + TINY), 'above': s / (s + n + TINY)}
+        size = max(1.0, abs(level))
+        sides = {'below': (s - _difference(q, level)) / size, 'above': s / size}
         marks.mark(kinks, marks.SIDES, s, (f'{block.doc} = {level:g}', sides))
         return s
 
