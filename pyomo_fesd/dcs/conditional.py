@@ -24,6 +24,7 @@ from pyomo.core.expr import (
     RangedExpression,
     identify_variables,
 )
+from pyomo.core.expr.numeric_expr import NPV_Expr_ifExpression
 
 from pyomo_fesd.errors import FesdError
 
@@ -31,9 +32,10 @@ from pyomo_fesd.errors import FesdError
 def call(node, args, place):
     """The expression that takes the place of an ``Expr_if``; ``args`` are its condition, THEN and ELSE."""
     condition, then, otherwise = args
-    if not any(True for _ in identify_variables(condition, include_fixed=True)):
-        return node.create_node_with_local_data(args)
     difference = then - otherwise
+    if not any(True for _ in identify_variables(condition, include_fixed=True)):
+        # a number that Pyomo evaluates each time that the model is solved
+        return otherwise + NPV_Expr_ifExpression((condition, 1, 0)) * difference
     if difference.__class__ in native_numeric_types and difference == 0:
         return otherwise
     if condition.__class__ is InequalityExpression:

@@ -240,9 +240,15 @@ class Place:
         Raises
         ------
         FesdError
-            where q cannot decide: it contains a derivative, or what the owner itself defines
+            where q cannot decide: it contains a jump, a derivative, or what the owner itself defines
         """
         for v in identify_variables(q, include_fixed=True):
+            if marks.is_generated(v) and v.parent_component().local_name == 'alpha':
+                raise FesdError(
+                    self.owner,
+                    f"its condition on '{q}' contains a function that jumps",
+                    "join conditions on what does not jump by land, lor and lnot",
+                )
             if v.parent_component() in self._pieces.rates:
                 raise FesdError(
                     self.owner,

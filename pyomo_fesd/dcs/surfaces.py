@@ -187,7 +187,8 @@ class Samples:
 def _affine(values, others):
     """(f, d) with values = f others + d, f not 0; None if there is none."""
     variation, other = values - values.mean(), others - others.mean()
-    f = float(variation @ other) / float(other @ other) if other.any() else 0.0
+    size = np.abs(other).max()
+    f = float(variation @ (other / size) / (other / size @ other)) if size > 1e-100 else 0.0
     rounding = 1e-14 * max(np.abs(values).max(), np.abs(f * others).max())
     if not f or np.abs(variation - f * other).max() > PROPORTIONAL * np.abs(variation).max() + rounding:
         return None
