@@ -77,18 +77,15 @@ class Mesh:
         return np.unique(ConvexHull(self.unit).equations.round(12), axis=0)
 
     def _refuse_holes(self, source):
+        """The simplices must fill the convex hull of their vertices."""
         dimension = len(self.size)
         filled = np.abs(np.linalg.det(self._matrices)).sum() / np.prod(range(1, dimension + 1))
         hull = ConvexHull(self.unit).volume
         if abs(filled - hull) > 1e-9 * hull:
-            raise FesdError(
-                source,
-                f"its simplices {'leave holes in' if filled < hull else 'overlap in'} the convex hull of their vertices",
-                "triangulate a convex domain",
-            )
+            _refuse_shape(source, 'leave holes' if filled < hull else 'overlap')
 
     def _heights(self, source):
-        rows, n = list(self._folds()), len(self.unit)
+        rows, n = list(self._folds(source)), len(self.unit)
         if not rows:
             return np.zeros(n)
         places = tuple(zip(*((i, v) for i, row in enumerate(rows) for v in row)))
@@ -103,7 +100,7 @@ class Mesh:
             )
         return result.x[:n]
 
-    def _folds(self):
+    def _folds(self, source):
         """For each facet between two simplices the coefficients of the heights, and of the margin as entry n."""
         facets, n = {}, len(self.unit)
         for i, simplex in enumerate(self.simplices):
@@ -111,4 +108,11 @@ class Mesh:
                 other = facets.setdefault(frozenset(simplex) - {u}, i)
                 if other != i:
                     w = np.linalg.solve(self._matrices[other], np.append(self.unit[u], 1.0))
-                    yield {**dict(zip(self.simplices[other], w)), u: -1.0, n: 1.0}
+                    weights = dict(zip(self.simplices[other], w))
+                    if any(weights[v] >= 0 for v in weights if v not in simplex):
+                        _refuse_shape(source, 'overlap')
+                    yield {**weights, u: -1.0, n: 1.0}
+
+
+def _refuse_shape(source, what):
+    raise FesdError(source, f"its simplices {what} in the convex hull of their vertices", "triangulate a convex domain")
