@@ -1,14 +1,13 @@
-"""Where the variables of functions in pieces go: one generated block, in it a block for each quantity that they depend on.
+"""Where the variables of functions in pieces go: a generated block, in it a block for each quantity that they depend on.
 
 The block of a quantity is the same at all times, so that the elements see its conditions as one family over time.  It bears the
-name of the quantity, and its ``doc`` tells the quantity in words.
+name of the quantity; its ``doc`` tells the quantity in words, and its Expression ``arguments`` holds it at each time.
 """
 
 import re
 
-from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentSet
-from pyomo.core import Block, Constraint, Suffix, Var
+from pyomo.core import Block, Constraint, Expression, RangeSet, Suffix, Var
 from pyomo.core.expr.visitor import expression_to_string
 from pyomo.mpec import Complementarity
 
@@ -19,100 +18,92 @@ from pyomo_fesd.timeindex import strip_time
 LONGEST_NAME = 40
 
 
-class _Known(AutoSlots.Mixin):
-    """Private data of the generated block.
-
-    Attributes
-    ----------
-    entries : dict (kind, time) -> list of (key, Block)
-        the quantities at each time
-    names : dict (kind, text) -> list of str
-        names of the blocks of the quantities with that text, of which there may be several at one time
-    """
-
-    __slots__ = ('entries', 'names')
-
-    def __init__(self):
-        self.entries = {}
-        self.names = {}
-
-
-Block.register_private_data_initializer(_Known, scope='pyomo_fesd.dcs.home')
-
-
 class Home:
-    """The generated block on ``instance``.
+    """The generated block ``name`` on ``instance``.
 
     Parameters
     ----------
     instance : BlockData
+    name : str
+        without the prefix of generated blocks
     times : TimeIndex
     undo : ExitStack
         is told how to take back what is written
     """
 
-    NAME = marks.GENERATED + 'pieces'
-
-    def __init__(self, instance, times, undo):
-        self._instance, self.times, self.undo = instance, times, undo
+    def __init__(self, instance, name, times, undo):
+        self._instance, self._name = instance, marks.GENERATED + name
+        self.times, self.undo = times, undo
+        self._entries = None
 
     @property
     def wrt(self):
         """The ContinuousSet."""
         return self.times.wrt
 
-    def entries(self, kind, time):
-        """All ``(key, block)`` of one kind at one time."""
-        return self._known().entries.get((kind, time), ())
-
-    def new(self, kind, time, key, text):
-        """The block for a new ``key`` at ``time``: that of the quantity with the same text at other times, or a new one."""
-        known = self._known()
-        here = known.entries.setdefault((kind, time), [])
-        taken = [block.local_name for _, block in here]
-        free = (n for n in known.names.get((kind, text), ()) if n not in taken)
-        block = self._block().component(next(free, None) or self._declare(kind, text))
-        here.append((key, block))
-        self.undo.callback(here.pop)
-        return block
-
     def blocks(self):
         """The blocks of all quantities."""
-        home = self._instance.component(self.NAME)
-        return home.component_objects(Block, descend_into=False) if home is not None else ()
+        home = self._instance.component(self._name)
+        return list(home.component_objects(Block, descend_into=False)) if home is not None else []
+
+    def entries(self, time):
+        """``(arguments, block)`` of every quantity at one time."""
+        if self._entries is None:
+            self._entries = self._read()
+        return self._entries.setdefault(time, [])
+
+    def new(self, time, arguments, text):
+        """The block for a new quantity at ``time``: that of the quantity with the same text at other times, or a new one."""
+        here = self.entries(time)
+        taken = ComponentSet(block for _, block in here)
+        free = (block for block in self.blocks() if block.doc == text and block not in taken)
+        block = next(free, None) or self._declare(text, len(arguments))
+        for k, argument in enumerate(arguments, start=1):
+            self.undo.callback(block.arguments._data.pop, (time, k))
+            block.arguments[time, k] = argument
+        here.append((tuple(arguments), block))
+        return block
 
     def name(self, component):
         """The name of a component, the same at all times."""
-        return strip_time(self.times.split(component)[1]).removeprefix(f'{self.NAME}.')
+        return strip_time(self.times.split(component)[1]).removeprefix(f'{self._name}.')
 
     def text(self, q):
         """A quantity in words, the same at all times."""
         return expression_to_string(q, labeler=self.name)
 
     def part(self, block, name, declare):
-        """Component ``name`` of the block of a quantity; made by ``declare()`` and added at its first time."""
+        """Component ``name`` of a block; made by ``declare()`` and added at its first time."""
         if block.component(name) is None:
             self.undo.callback(block.del_component, name)
             block.add_component(name, declare())
         return block.component(name)
 
-    def _known(self):
-        return self._block().private_data('pyomo_fesd.dcs.home')
+    def _read(self):
+        """The entries that the model has."""
+        found = {}
+        for block in self.blocks():
+            held = {}
+            for (time, _), argument in sorted(block.arguments.items()):
+                # pyomo.dae gives an Expression all its indices
+                if argument.expr is not None:
+                    held.setdefault(time, []).append(argument.expr)
+            for time, arguments in held.items():
+                found.setdefault(time, []).append((tuple(arguments), block))
+        return found
 
-    def _block(self):
-        return self.part(self._instance, self.NAME, Block)
-
-    def _declare(self, kind, text):
-        block, known = self._block(), self._known()
+    def _declare(self, text, count):
+        home = self.part(self._instance, self._name, Block)
         plain = re.sub(r'\W+', '_', text).strip('_')[:LONGEST_NAME] or 'quantity'
         name, number = plain, 1
-        while block.component(name) is not None:
+        while home.component(name) is not None:
             number += 1
             name = f'{plain}_{number}'
-        self.part(block, name, Block).doc = text
-        known.names.setdefault((kind, text), []).append(name)
-        self.undo.callback(known.names[kind, text].remove, name)
-        return name
+        block = self.part(home, name, Block)
+        block.doc = text
+        block.count = RangeSet(count)
+        block.arguments = Expression(self.wrt, block.count, rule=lambda *_: Expression.Skip)
+        return block
 
 
 def forget(block, index):

@@ -19,7 +19,8 @@ Does not apply: to functions that jump from one simplex to the next (simplices.p
 """
 
 import numpy as np
-from pyomo.core import Constraint, RangeSet, Var, value
+from pyomo.common.autoslots import AutoSlots
+from pyomo.core import Block, Constraint, RangeSet, Var, value
 from pyomo.core.expr.compare import compare_expressions
 from pyomo.mpec import Complementarity, complements
 
@@ -34,12 +35,24 @@ from pyomo_fesd.errors import FesdError
 ROUNDING = 1e-9
 
 
+class _Triangulation(AutoSlots.Mixin):
+    """Private data of the block of a mesh: its vertices and simplices."""
+
+    __slots__ = ('triangulation',)
+
+    def __init__(self):
+        self.triangulation = None
+
+
+Block.register_private_data_initializer(_Triangulation, scope='pyomo_fesd.dcs.multivariate')
+
+
 def call(node, args, place):
     """The value of a PiecewiseLinearFunction of several arguments."""
     function = node.pw_linear_function
     mesh = place.cached(Mesh, _triangulation(function), function)
     values = _values(function, mesh)
-    text = f'{place.home.name(function)}({", ".join(map(place.home.text, args))})'
+    text = f'{place.meshes.name(function)}({", ".join(map(place.meshes.text, args))})'
     if values is None:
         return simplices.choose(function, text, mesh, args, place)
     return sum(w * y for w, y in zip(_weights(text, mesh, args, place), values) if y)
@@ -82,11 +95,11 @@ def _values(function, mesh):
 
 def _weights(text, mesh, args, place):
     """w of every vertex; those that are there already, where the arguments are the same."""
-    home, time = place.home, place.time
-    for (known, *others), block in home.entries('mesh', time):
-        if known == mesh.triangulation and all(compare_expressions(a, b) for a, b in zip(args, others)):
+    home, time = place.meshes, place.time
+    for known, block in home.entries(time):
+        if _triangulation_of(block) == mesh.triangulation and all(map(compare_expressions, args, known)):
             return [block.w[time, k] for k in block.vertices]
-    block = home.new('mesh', time, (mesh.triangulation, *args), text)
+    block = home.new(time, args, text)
     if block.component('w') is None:
         _declare(block, home.wrt, mesh)
     home.undo.callback(forget, block, (time,))
@@ -94,7 +107,12 @@ def _weights(text, mesh, args, place):
     return [block.w[time, k] for k in block.vertices]
 
 
+def _triangulation_of(block):
+    return block.private_data('pyomo_fesd.dcs.multivariate').triangulation
+
+
 def _declare(block, wrt, mesh):
+    block.private_data('pyomo_fesd.dcs.multivariate').triangulation = mesh.triangulation
     block.vertices, block.rows = RangeSet(len(mesh.vertices)), RangeSet(len(mesh.size) + 1)
     block.w = Var(wrt, block.vertices, dense=False, bounds=(0, None))
     block.lam = Var(wrt, block.vertices, dense=False, bounds=(0, None))

@@ -72,7 +72,8 @@ class Pieces:
     """
 
     def __init__(self, instance, times, undo):
-        self.home = Home(instance, times, undo)
+        self.home = Home(instance, 'surfaces', times, undo)
+        self.meshes = Home(instance, 'meshes', times, undo)
         self.surfaces = Surfaces(self.home)
         self.times, self.undo = times, undo
         self.rates = ComponentSet(derivatives(instance.model(), times.wrt))
@@ -223,12 +224,12 @@ class Place:
     ----------
     owner : component that is named in messages
     time : time label
-    home : Home
+    meshes : Home
     """
 
     def __init__(self, pieces, owner, time):
         self._pieces, self.owner, self.time = pieces, owner, time
-        self.home, self.switch_off = pieces.home, pieces.switch_off
+        self.meshes, self.switch_off = pieces.meshes, pieces.switch_off
 
     def positive_part(self, q, level):
         """max(0, q - level)."""

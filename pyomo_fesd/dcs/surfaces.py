@@ -123,12 +123,12 @@ class Surfaces:
 
     def _locate(self, time, q, level):
         """The block of q, q as it was first met at this time, and the factor and the level that q has in terms of it."""
-        here = self._home.entries('surface', time)
-        found = [(known, block, 1.0, 0.0) for known, block in here if known is q]
+        here = self._home.entries(time)
+        found = [(known, block, 1.0, 0.0) for (known,), block in here if known is q]
         if not found:
-            related = ((known, block, self._relation(q, known)) for known, block in here)
+            related = ((known, block, self._relation(q, known)) for (known,), block in here)
             found = [(known, block, *relation) for known, block, relation in related if relation is not None]
-        known, block, factor, shift = found[0] if found else (q, self._home.new('surface', time, q, self._home.text(q)), 1.0, 0.0)
+        known, block, factor, shift = found[0] if found else (q, self._home.new(time, [q], self._home.text(q)), 1.0, 0.0)
         return block, known, factor, _as_known(block, (level - shift) / factor, max(abs(level), abs(shift)) / abs(factor))
 
     def _relation(self, q, known):

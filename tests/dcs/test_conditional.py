@@ -21,7 +21,7 @@ fesd_dcs = pyo.TransformationFactory('fesd.dcs')
 
 
 def generated(m, ctype):
-    return [c for c in m.component_data_objects(ctype, descend_into=pyo.Block) if '_pyomo_fesd_pieces.' in c.name]
+    return [c for c in m.component_data_objects(ctype, descend_into=pyo.Block) if '_pyomo_fesd_surfaces.' in c.name]
 
 
 def counts(m):
@@ -238,7 +238,7 @@ def test_the_solution_is_exact_to_the_order_of_the_scheme(table, tolerance, disc
 def test_a_slide_gives_the_share_of_each_branch():
     m = run(ode(lambda m, t: pyo.Expr_if(m.x[t] <= 0, 3, -1)), 6, 2)
     assert [str(s) for s in pyomo_fesd.switches(m)] == ['time 0.6666666667: x = 0  below -> sliding below | above']
-    assert m._pyomo_fesd_pieces.x.step.alpha[2, 0.0].value == pytest.approx(3 / 4)
+    assert m._pyomo_fesd_surfaces.x.step.alpha[2, 0.0].value == pytest.approx(3 / 4)
 
 
 def test_friction_factor_of_a_pipe_that_starts_up():

@@ -62,7 +62,7 @@ def collected(function, start=(0.2, 0.1), rates=(1.5, 0.7), end=1.0):
 
 
 def generated(m, ctype):
-    return [c for c in m.component_data_objects(ctype, descend_into=pyo.Block) if '_pyomo_fesd_pieces.' in c.name]
+    return [c for c in m.component_data_objects(ctype, descend_into=pyo.Block) if '_pyomo_fesd_meshes.' in c.name]
 
 
 def counts(m):
@@ -127,7 +127,7 @@ def test_functions_on_the_same_mesh_share_it():
     m.other = pyo.Constraint(m.t, rule=lambda m, t: m.z[t] == m.g(m.x[t], m.y[t]) + m.f(m.x[t], m.y[t]))
     dcs(m)
     assert counts(m) == [2 * 9 + 3, 9 + 3, 9]
-    assert list(m._pyomo_fesd_pieces.component_map()) == ['f_x_y']
+    assert list(m._pyomo_fesd_meshes.component_map()) == ['f_x_y']
 
 
 def test_other_arguments_have_weights_of_their_own():
@@ -207,8 +207,9 @@ def test_a_function_that_jumps_is_chosen_by_its_simplices():
     m = dcs(line(cliff()))
     # nu, lam, mu; the sides of the domain are bounds already
     assert counts(m) == [5, 3, 2]
-    m = dcs(line(cliff(), highest=3))
-    assert counts(m) == [5, 5, 2]
+    m = line(cliff(), highest=3)
+    m.again = pyo.Constraint(m.t, rule=lambda m, t: m.f(m.x[t], m.y[t]) <= 2)
+    assert counts(dcs(m)) == [5, 5, 2]
 
 
 def test_across_a_jump_the_function_is_collected_exactly():

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pyomo.common.collections import ComponentSet
 from pyomo.contrib.piecewise import PiecewiseLinearFunction
 from pyomo.gdp import Disjunction
-from pyomo.mpec import Complementarity
+from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
@@ -43,7 +43,7 @@ fesd_dcs = pyo.TransformationFactory('fesd.dcs')
 
 def generated(m, ctype):
     """Data of one type in generated blocks, images apart."""
-    return [c for c in m.component_data_objects(ctype, descend_into=pyo.Block) if '_pyomo_fesd_pieces.' in c.name]
+    return [c for c in m.component_data_objects(ctype, descend_into=pyo.Block) if '_pyomo_fesd_surfaces.' in c.name]
 
 
 def counts(m):
@@ -160,7 +160,7 @@ def test_tables_of_the_same_argument_share_their_kinks():
     dcs(m)
     # f and g bend at 1 and 2; g(2 - x) bends where x is 1 and 0
     assert counts(m) == [3, 0, 3]
-    assert list(m._pyomo_fesd_pieces.component_map()) == ['x']
+    assert list(m._pyomo_fesd_surfaces.component_map()) == ['x']
 
 
 @pytest.mark.parametrize('lowest, highest, rows', [(0, 10, 0), (0.1, 9, 0), (-1, 10, 1), (0, 11, 1), (None, None, 1)])
@@ -171,7 +171,7 @@ def test_the_domain_is_kept_where_bounds_do_not_keep_it(lowest, highest, rows):
     dcs(m)
     assert counts(m)[1] == rows
     if rows:
-        assert pyo.value(m._pyomo_fesd_pieces.x.inside[0, 0.0, 10.0].upper) == 10
+        assert pyo.value(m._pyomo_fesd_surfaces.x.inside[0, 0.0, 10.0].upper) == 10
 
 
 # Whole paths
@@ -211,7 +211,7 @@ def test_where_it_slides_the_step_says_how_much_of_each_side_there_is():
     m = run(by_piecewise(HOLDING, 0.5, 1), 6, 2)
     assert pyomo_fesd.switches(m)[0].after == 'sliding below | above'
     # dx = 2 - 3 alpha = 0
-    assert m._pyomo_fesd_pieces.x.step.alpha[1, 1.0].value == pytest.approx(2 / 3)
+    assert m._pyomo_fesd_surfaces.x.step.alpha[1, 1.0].value == pytest.approx(2 / 3)
     assert m.y[1].value == pytest.approx(0, abs=1e-8)
 
 
@@ -349,7 +349,7 @@ def test_what_no_constraint_uses_is_not_transformed_and_not_in_the_way():
     m.g = PiecewiseLinearFunction(tabular_data={0: 0, 5: 2, 10: 3})
     m.extra = pyo.Expression(m.t, rule=lambda m, t: m.g(m.x[t]))
     run(m, 4, 2)
-    assert m._pyomo_fesd_pieces.x.kink.levels.data() == (1.0, 2.0)
+    assert m._pyomo_fesd_surfaces.x.kink.levels.data() == (1.0, 2.0)
     assert pyomo_fesd.trajectory(m)['extra'].isna().all()
 
 
@@ -420,6 +420,22 @@ def test_a_clone_between_the_transformations_goes_its_own_way():
     solve(copy)
     assert copy.x[1.5].value == pytest.approx(exact(BENT, 0.5, 1.5)[0], abs=1e-5)
     assert len(m.t) == 2 and all(v.model() is m for v in generated(m, pyo.Var))
+
+
+def test_a_discretisation_that_fails_can_be_repeated():
+    m = by_function(BENT, 0.5, 1.5)
+    m.ode.deactivate()
+    inner = pyo.Constraint.Skip
+    m.inside = pyo.Constraint(m.t, rule=lambda m, t: inner if t in (0, 1.5) else m.dx[t] == m.f(m.x[t]))
+    m.bad = Complementarity(m.t, rule=lambda m, t: complements(pyo.inequality(0, m.x[t], 10), m.dx[t]))
+    dcs(m)
+    with pytest.raises(FesdError, match='two bounds on one side'):
+        pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=6, ncp=2, scheme='LAGRANGE-LEGENDRE')
+    m.bad.deactivate()
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=6, ncp=2, scheme='LAGRANGE-LEGENDRE')
+    assert solve(m).x[1.5].value == pytest.approx(exact(BENT, 0.5, 1.5)[0], abs=1e-5)
+    assert list(m._pyomo_fesd_surfaces.component_map()) == ['x']
+    assert len(generated(m, Complementarity)) == 2 * (len(m.t) - 2)
 
 
 @writings
