@@ -6,8 +6,9 @@ A mark is a ``Suffix(direction=LOCAL)`` with one of the names below on the block
 =================  ========================  ===========================================================================
 mark               on                        value
 =================  ========================  ===========================================================================
-CONTINUOUS         Var                       the Constraint (of lam, mu, p, n) or Complementarity (of a kink's s) that ties it to
-                                             the states: continuous in time where the quantity that switches is
+CONTINUOUS         Var                       the Constraint (of lam, mu, p, n), Complementarity (of a kink's s) or Expression (the
+                                             arguments of the weights w) that ties it to the states: continuous in time where
+                                             the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
 SIDES              Var                       (name, {side: expression}) of the surface that it belongs to: positive where the

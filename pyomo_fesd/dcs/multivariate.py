@@ -120,7 +120,7 @@ def _declare(block, wrt, mesh):
     block.stationarity = Constraint(wrt, block.vertices)
     block.combination = Constraint(wrt, block.rows)
     block.complementarity = Complementarity(wrt, block.vertices)
-    marks.mark(block, marks.CONTINUOUS, block.w, block.combination)
+    marks.mark(block, marks.CONTINUOUS, block.w, block.arguments)
 
 
 def _add(block, time, mesh, args):

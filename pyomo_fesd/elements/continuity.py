@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, Constraint
+from pyomo.core import Block, Constraint, Expression
 from pyomo.core.expr.visitor import identify_variables
-from pyomo.mpec import Complementarity
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
@@ -26,7 +25,7 @@ class Continuity:
 
     Attributes
     ----------
-    rules : ComponentMap Var -> Constraint or Complementarity
+    rules : ComponentMap Var -> Constraint, Complementarity or Expression
         what ties each marked variable to the states
     inside : ComponentSet
         continuous inside every control stage
@@ -75,8 +74,8 @@ def read_continuity(model, times, held, told, trace):
         whether algebraic variables matter: they do not where ``fesd.dcs`` wrote every condition
     """
     rules = ComponentMap(marks.marked(model, marks.CONTINUOUS))
-    kinks = [(v, rule) for v, rule in rules.items() if rule.ctype is Complementarity]
-    equations = _Equations(model, times, kinks) if trace or kinks else None
+    functions = [(v, rule) for v, rule in rules.items() if rule.ctype is not Constraint]
+    equations = _Equations(model, times, functions) if trace or functions else None
     start = ComponentSet(d.get_state_var() for d in derivatives(model, times.wrt))
     start.update(told)
     across = _closure(start, rules, held, equations)
@@ -102,22 +101,34 @@ def _mentions(rule, components):
 class _Equations:
     """The algebraic equations of one inner time, as lists of the variables that they contain.
 
-    A kink is one of them: its condition says s = max(0, z).  So it may be part of an implicit equation for z.
+    A continuous function is one of them: the condition of a kink says s = max(0, z), the weights of a mesh follow from its
+    arguments.  So they may be part of an implicit equation.
     """
 
-    def __init__(self, model, times, kinks):
+    def __init__(self, model, times, functions):
         label = list(times.wrt)[1]
+        # what a function of its arguments is made of says nothing of the arguments
+        inside = ComponentSet(rule.parent_block() for _, rule in functions if rule.ctype is Expression)
         constraints = model.component_data_objects(Constraint, active=True, descend_into=Block)
         equations = [
             [c.body]
             for c in constraints
-            if c.equality and times.time(c) == label and not c.parent_component().local_name.endswith(DISCRETISATION)
+            if c.equality
+            and times.time(c) == label
+            and not c.parent_component().local_name.endswith(DISCRETISATION)
+            and c.parent_block() not in inside
         ]
-        # pyomo.dae gives a Var all its indices, also those without a condition
-        conditions = [rule[i] for v, rule in kinks for i, s in v.items() if i in rule and times.time(s) == label]
+        for component, rule in functions:
+            here = {index: v for index, v in component.items() if times.time(v) == label}
+            if rule.ctype is Expression:
+                arguments = [e for e in rule.values() if e.expr is not None and times.time(e) == label]
+                equations += [[v, *arguments] for v in here.values() if arguments]
+            else:
+                # pyomo.dae gives a Var all its indices, also those without a condition
+                equations += [rule[index]._args for index in here if index in rule]
         self._rows = [
             [v for v in ComponentSet(v for e in row for v in identify_variables(e)) if times.time(v) is not None]
-            for row in (*equations, *(c._args for c in conditions))
+            for row in equations
         ]
 
     def tied(self, known):

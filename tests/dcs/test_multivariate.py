@@ -1,6 +1,7 @@
 """Piecewise linear functions of several arguments: the simplex of a point by a linear program."""
 
 import itertools
+from math import exp, log
 
 import numpy as np
 import pyomo.dae as dae
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyomo.contrib.piecewise import PiecewiseLinearFunction, Triangulation
+from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
@@ -185,6 +187,24 @@ def test_three_arguments():
     x, met = 0.1, (0.3 - 0.1) / 0.75
     integral = 0.1 + 0.375 + 0.05 + 0.175 - met * (0.3 - x) / 2
     assert m.J[1].value == pytest.approx(integral, abs=1e-8)
+
+
+def test_an_argument_may_jump(caplog):
+    """A controller switches the second argument over; the first is the state."""
+    m = line(
+        PiecewiseLinearFunction(points=[(x, u) for x in (0, 1, 6) for u in (0, 0.5, 2)], function=lambda x, u: 1 + 2 * u + x),
+        highest=6,
+    )
+    for c in (m.run_x, m.run_y, m.collect):
+        c.deactivate()
+    m.u = pyo.Var(m.t, bounds=(0, 2), initialize=0.5)
+    m.controller = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 1.5, m.u[t] == 0.3], [m.x[t] >= 1.5, m.u[t] == 1.2]])
+    m.rise = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == m.f(m.x[t], m.u[t]))
+    run(m, 8, 3)
+    # dx = 1.6 + x up to 1.5, then 3.4 + x
+    met = log(3.1 / 1.8)
+    assert m.x[1].value == pytest.approx(4.9 * exp(1 - met) - 3.4, abs=1e-6)
+    assert 'neither side is known to be continuous' in caplog.text
 
 
 def test_x_cannot_leave_the_domain():

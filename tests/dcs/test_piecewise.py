@@ -260,6 +260,20 @@ def test_an_implicit_equation_may_contain_the_function():
     assert found[1:] == pytest.approx((level, energy), abs=1e-8)
 
 
+def test_the_argument_of_a_kink_may_jump():
+    m = states(1.0, 2, 0, 4)
+    m.u, m.flow = pyo.Var(m.t, bounds=(0, 2), initialize=0.5), pyo.Var(m.t, initialize=1)
+    m.relay = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 1.5, m.u[t] == 0.3], [m.x[t] >= 1.5, m.u[t] == 1.2]])
+    m.f = PiecewiseLinearFunction(tabular_data={0: 1, 0.5: 2, 2: 3})
+    m.characteristic = pyo.Constraint(m.t, rule=lambda m, t: m.flow[t] == m.f(m.u[t]))
+    m.ode = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == 0.3 * m.flow[t])
+    run(m, 8, 2)
+    # f(0.3) = 1.6, f(1.2) = 2 + 0.7*2/3
+    met = 0.5 / 0.48
+    assert m.x[2].value == pytest.approx(1.5 + (2 - met) * 0.3 * (2 + 1.4 / 3), abs=1e-9)
+    assert {s.disjunction: s.time for s in pyomo_fesd.switches(m)} == pytest.approx({'relay': met, 'u = 0.5': met}, abs=1e-9)
+
+
 def test_bounds_in_optimal_control():
     """The fastest way under a limit that falls and rises again; a convex lower bound stays as Pyomo writes it."""
     m = states(0, 1)
