@@ -3,6 +3,8 @@
 Nothing here is needed to solve; all of it survives ``clone``.
 """
 
+from functools import reduce
+
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, TransformationFactory
@@ -18,7 +20,7 @@ class Records(AutoSlots.Mixin):
     repeats : list of (name, block, ContinuousSet, keywords)
         transformations applied before discretisation
     rewrites : list of (name, block, ContinuousSet)
-        transformations whose ``rewrite`` an integrand has to pass, since it is built after them
+        transformations whose ``rewriter`` an integrand has to pass, since it is built after them
     grids : ComponentMap ContinuousSet -> Block
         the block with the element lengths of each moving grid
     """
@@ -61,9 +63,8 @@ def rewrite_integrands(block, name, wrt):
         rewrites.append((name, block, wrt))
 
 
-def rewritten(integral, wrt, expression):
-    """An integrand of ``integral`` after all that it has to pass."""
-    for name, where, over in records(integral).rewrites:
-        if over is wrt:
-            expression = TransformationFactory(name).rewrite(where, wrt, expression, integral)
-    return expression
+def rewriter(integral, wrt):
+    """A function that sends an integrand of ``integral`` through all that it has to pass."""
+    found = [(name, where) for name, where, over in records(integral).rewrites if over is wrt]
+    steps = [TransformationFactory(name).rewriter(where, wrt, integral) for name, where in found]
+    return lambda expression: reduce(lambda e, step: step(e), steps, expression)

@@ -21,6 +21,7 @@ RADAU, LEGENDRE = 'LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE'
         ('toy_mpec', '21 certified'),
         ('gas_liquid_tank', '9.354868539 s'),
         ('oscillator', 'The circle is crossed at t = 1.000'),
+        ('pump_curve', 'time 2.566377815: q = 30  above -> below'),
     ],
 )
 def test_example_says_what_it_found_and_draws(name, said, tmp_path, monkeypatch, capsys):

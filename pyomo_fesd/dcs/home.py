@@ -73,11 +73,8 @@ class Home:
         return expression_to_string(q, labeler=self.name)
 
     def part(self, block, name, declare):
-        """Component ``name`` of a block; made by ``declare()`` and added at its first time."""
-        if block.component(name) is None:
-            self.undo.callback(block.del_component, name)
-            block.add_component(name, declare())
-        return block.component(name)
+        """``part`` with the undo of this home."""
+        return part(block, name, declare, self.undo)
 
     def _read(self):
         """The entries that the model has."""
@@ -104,6 +101,14 @@ class Home:
         block.count = RangeSet(count)
         block.arguments = Expression(self.wrt, block.count, rule=lambda *_: Expression.Skip)
         return block
+
+
+def part(block, name, declare, undo):
+    """Component ``name`` of a block; made by ``declare()`` and added at its first time."""
+    if block.component(name) is None:
+        undo.callback(block.del_component, name)
+        block.add_component(name, declare())
+    return block.component(name)
 
 
 def forget(block, index):

@@ -50,9 +50,10 @@ Block.register_private_data_initializer(_Triangulation, scope='pyomo_fesd.dcs.mu
 def call(node, args, place):
     """The value of a PiecewiseLinearFunction of several arguments."""
     function = node.pw_linear_function
-    mesh = place.cached(Mesh, _triangulation(function), function)
+    mesh = place.shared.once(Mesh, _triangulation(function), function)
     values = _values(function, mesh)
-    text = f'{place.meshes.name(function)}({", ".join(map(place.meshes.text, args))})'
+    home = place.shared.meshes
+    text = f'{home.name(function)}({", ".join(map(home.text, args))})'
     if values is None:
         return simplices.choose(function, text, mesh, args, place)
     return sum(w * y for w, y in zip(_weights(text, mesh, args, place), values) if y)
@@ -95,7 +96,7 @@ def _values(function, mesh):
 
 def _weights(text, mesh, args, place):
     """w of every vertex; those that are there already, where the arguments are the same."""
-    home, time = place.meshes, place.time
+    home, time = place.shared.meshes, place.time
     for known, block in home.entries(time):
         if _triangulation_of(block) == mesh.triangulation and all(map(compare_expressions, args, known)):
             return [block.w[time, k] for k in block.vertices]

@@ -5,16 +5,14 @@ A function is replaced by an expression of the variables that its rule leaves (p
 * in a named Expression it is replaced in place: an Expression has no state of its own that could be switched off, and whoever
   uses it gets the new one.  ``PiecewiseLinearFunction`` wraps each of its values in one.  Objectives are changed in place, too,
   since results are reported under their name;
-* a Constraint in which it stands directly is deactivated, and its image stands in a block beside it, under the same name and
-  index.  So does the equation of a ``Piecewise``.
+* a Constraint in which it stands directly is deactivated, and its image stands beside it (images.py).  So does the equation of a
+  ``Piecewise``.
 
 Takes: active Constraints, Objectives, Complementarities and ``Piecewise`` of some blocks, those inside disjuncts too.
 Leaves: what the rules leave; images; the functions and the ``Piecewise`` are deactivated.
 Does not apply: where neither the component nor the arguments are over time.
 """
 
-from pyomo.common.autoslots import AutoSlots
-from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.common.numeric_types import native_types
 from pyomo.contrib.piecewise import PiecewiseLinearExpression, PiecewiseLinearFunction
 from pyomo.core import Block, Constraint, Objective
@@ -25,11 +23,10 @@ from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
-from pyomo_fesd.dcs import conditional, multivariate, piecewise
-from pyomo_fesd.dcs.home import Home
-from pyomo_fesd.dcs.surfaces import Surfaces
+from pyomo_fesd.dcs import conditional, images, multivariate, piecewise
+from pyomo_fesd.dcs.place import Place, Shared
 from pyomo_fesd.errors import FesdError
-from pyomo_fesd.timeindex import DISCRETISATION, derivatives, discretised
+from pyomo_fesd.timeindex import DISCRETISATION, discretised
 
 
 def _call(node, args, place):
@@ -41,22 +38,8 @@ def _call(node, args, place):
 #: node of an expression -> rule(node, args, place) that gives the expression in its place
 RULES = {PiecewiseLinearExpression: _call, Expr_ifExpression: conditional.call}
 PLACES = (Block, Disjunct)
-IMAGES = marks.GENERATED + 'images'
 #: Beginning of the names of the blocks of contrib.piecewise's transformations.
 WRITTEN_BY_PYOMO = '_pyomo_contrib_pw_linear'
-
-
-class _Maps(AutoSlots.Mixin):
-    """Private data of a block of images: where each came from."""
-
-    __slots__ = ('sources', 'images')
-
-    def __init__(self):
-        self.sources = ComponentMap()
-        self.images = ComponentMap()
-
-
-Block.register_private_data_initializer(_Maps, scope='pyomo_fesd.dcs.pieces')
 
 
 class Pieces:
@@ -72,47 +55,48 @@ class Pieces:
     """
 
     def __init__(self, instance, times, undo):
-        self.home = Home(instance, 'surfaces', times, undo)
-        self.meshes = Home(instance, 'meshes', times, undo)
-        self.surfaces = Surfaces(self.home)
-        self.times, self.undo = times, undo
-        self.rates = ComponentSet(derivatives(instance.model(), times.wrt))
-        self.states = ComponentSet(d.get_state_var() for d in self.rates)
-        self.cache = {}
+        self._shared = Shared(instance, times, undo)
+        self._times, self._undo = times, undo
 
     def replace_all(self, blocks):
         """Replace everything below ``blocks``."""
         for block in blocks:
-            _refuse_written_by_pyomo(block, self.times)
+            _refuse_written_by_pyomo(block, self._times)
             for source in list(_piecewise(block)):
-                if self.times.time(source) is not None:
-                    self._write_image(source, piecewise.relation(source, Place(self, source, self.times.time(source))))
+                time = self._times.time(source)
+                if time is not None:
+                    images.write(source, piecewise.relation(source, Place(self._shared, source, time)), self._undo)
             for source in list(_sources(block)):
-                if _contains(source, self.times.wrt):
+                if _contains(source, self._times.wrt):
                     WRITERS[source.ctype](self, source)
             for function in block.component_data_objects(PiecewiseLinearFunction, active=True, descend_into=PLACES):
                 if any(self._time(call) is not None for call in function._expressions.values()):
-                    self.switch_off(function)
-        self.surfaces.warn_explicit_time()
+                    images.switch_off(function, self._undo)
+        self._shared.surfaces.warn_explicit_time()
 
     def replaced(self, expression, owner):
         """``expression`` with expressions in the place of its functions; named Expressions in it are changed."""
         return _Rewriter(self, owner).walk_expression(expression)
 
-    def time(self, owner, node):
-        """The time of ``owner``, or the last one that occurs in a node of it: an Integral is not over time itself."""
-        time = self.times.time(owner)
-        return self._time(node) if time is None else time
+    def place(self, owner, node):
+        """Where a node of ``owner`` stands: the last time that occurs in it, or else the owner's; None without time."""
+        time = self._time(node)
+        time = self._times.time(owner) if time is None else time
+        return None if time is None else Place(self._shared, owner, time)
+
+    def waits(self, node):
+        """Whether a node is an Integral that pyomo.dae will build anew when it discretises."""
+        return _waits(node, self._times.wrt)
 
     def _time(self, expression):
-        labels = (self.times.time(v) for v in identify_variables(expression, include_fixed=True))
+        labels = (self._times.time(v) for v in identify_variables(expression, include_fixed=True))
         return max((t for t in labels if t is not None), default=None)
 
     def write_constraint(self, source):
         """Replace in a Constraint."""
         expression = self.replaced(source.expr, source)
         if expression is not source.expr:
-            self._write_image(source, expression)
+            images.write(source, expression, self._undo)
 
     def write_objective(self, source):
         """Replace in an Objective."""
@@ -120,34 +104,14 @@ class Pieces:
 
     def write_complementarity(self, source):
         """Replace in the named Expressions of a Complementarity; its own arguments cannot be changed."""
-        if any(self.replaced(side, source) is not side for side in source._args):
+        if any(self.replaced(side, source) is not side for side in _sides(source)):
             raise FesdError(source, "a side of it contains an Expr_if", "give the Expr_if an Expression over time of its own")
 
     def set(self, source, expression):
         """Give an Objective or a named Expression another expression."""
         if expression is not source.expr:
-            self.undo.callback(source.set_value, source.expr)
+            self._undo.callback(source.set_value, source.expr)
             source.set_value(expression)
-
-    def switch_off(self, component):
-        """Deactivate a component."""
-        if component.active:
-            self.undo.callback(component.activate)
-            component.deactivate()
-
-    def _write_image(self, source, expression):
-        """The image of a Constraint or a Piecewise; there already where pyomo.dae has built the Piecewise anew."""
-        parent, component, index = source.parent_block(), source.parent_component(), source.index()
-        block = self.home.part(parent, IMAGES, Block)
-        sets = (component.index_set(),) if component.is_indexed() else ()
-        images = self.home.part(block, component.local_name, lambda: Constraint(*sets))
-        if index not in images:
-            self.undo.callback(images._data.pop, index, None)
-            images.add(index, expression)
-        maps = block.private_data('pyomo_fesd.dcs.pieces')
-        maps.sources[images[index]] = source
-        maps.images[source] = images[index]
-        self.switch_off(source)
 
 
 #: type of a component -> how it is written
@@ -156,17 +120,6 @@ WRITERS = {
     Objective: Pieces.write_objective,
     Complementarity: Pieces.write_complementarity,
 }
-
-
-def image(source):
-    """The generated Constraint in the place of a Constraint or Piecewise; None if there is none."""
-    block = source.parent_block().component(IMAGES)
-    return None if block is None else block.private_data('pyomo_fesd.dcs.pieces').images.get(source)
-
-
-def source(image):
-    """The Constraint or Piecewise that an image stands for; None for other components."""
-    return image.parent_block().private_data('pyomo_fesd.dcs.pieces').sources.get(image)
 
 
 def _refuse_written_by_pyomo(block, times):
@@ -202,7 +155,7 @@ def _sources(block):
 
 def _contains(source, wrt):
     """Whether a function in pieces stands somewhere in a component."""
-    waiting = list(source._args) if source.ctype is Complementarity else [source.expr]
+    waiting = _sides(source) if source.ctype is Complementarity else [source.expr]
     while waiting:
         node = waiting.pop()
         if node.__class__ in RULES:
@@ -212,76 +165,14 @@ def _contains(source, wrt):
     return False
 
 
+def _sides(condition):
+    """The two arguments of a Complementarity; none where it is empty."""
+    return list(getattr(condition, '_args', None) or ())
+
+
 def _waits(node, wrt):
     """Whether a node is an Integral that pyomo.dae will build anew when it discretises."""
     return node.is_named_expression_type() and isinstance(node.parent_component(), Integral) and not discretised(wrt)
-
-
-class Place:
-    """One time of one component, as the rules see it.
-
-    Attributes
-    ----------
-    owner : component that is named in messages
-    time : time label
-    meshes : Home
-    """
-
-    def __init__(self, pieces, owner, time):
-        self._pieces, self.owner, self.time = pieces, owner, time
-        self.meshes, self.switch_off = pieces.meshes, pieces.switch_off
-
-    def positive_part(self, q, level):
-        """max(0, q - level)."""
-        return self._pieces.surfaces.positive_part(self.time, q, level)
-
-    def indicator(self, q, level, sign=1):
-        """1 where sign (q - level) > 0, else 0.
-
-        Raises
-        ------
-        FesdError
-            where q cannot decide: it contains a jump, a derivative, or what the owner itself defines
-        """
-        for v in identify_variables(q, include_fixed=True):
-            if marks.is_generated(v) and v.parent_component().local_name == 'alpha':
-                raise FesdError(
-                    self.owner,
-                    f"its condition on '{q}' contains a function that jumps",
-                    "join conditions on what does not jump by land, lor and lnot",
-                )
-            if v.parent_component() in self._pieces.rates:
-                raise FesdError(
-                    self.owner,
-                    f"its condition on '{q}' contains the derivative '{v.name}'",
-                    "let states decide; a rate that decides makes the pieces depend on themselves",
-                )
-            if v.parent_component() not in self._pieces.states and _stands_alone(v, self.owner):
-                raise FesdError(
-                    self.owner,
-                    f"its condition on '{q}' contains '{v.name}', which it defines itself",
-                    "let states decide, or variables that do not jump at the switch",
-                )
-        return self._pieces.surfaces.indicator(self.time, q, level, sign)
-
-    def keep_inside(self, q, lower, upper):
-        """Impose lower <= q <= upper."""
-        self._pieces.surfaces.keep_inside(self.time, q, lower, upper)
-
-    def multiple(self, expression, q, level):
-        """f where ``expression`` is f (q - level), None elsewhere."""
-        return self._pieces.surfaces.multiple(expression, q, level)
-
-    def cached(self, make, key, *others):
-        """``make(key, *others)``, once for each key."""
-        if key not in self._pieces.cache:
-            self._pieces.cache[key] = make(key, *others)
-        return self._pieces.cache[key]
-
-
-def _stands_alone(v, owner):
-    """Whether a variable is a side of an equation."""
-    return owner.ctype is Constraint and owner.equality and any(side is v for side in owner.expr.args)
 
 
 class _Rewriter(ExpressionReplacementVisitor):
@@ -292,15 +183,15 @@ class _Rewriter(ExpressionReplacementVisitor):
         self._pieces, self._owner = pieces, owner
 
     def beforeChild(self, node, child, position):
-        if child.__class__ not in native_types and child.is_expression_type() and _waits(child, self._pieces.times.wrt):
+        if child.__class__ not in native_types and child.is_expression_type() and self._pieces.waits(child):
             return False, child
         return super().beforeChild(node, child, position)
 
     def exitNode(self, node, data):
-        changed, args, _ = data
+        _, args, _ = data
         if node.__class__ in RULES:
-            time = self._pieces.time(self._owner, node)
-            return node if time is None else RULES[node.__class__](node, args, Place(self._pieces, self._owner, time))
+            place = self._pieces.place(self._owner, node)
+            return node if place is None else RULES[node.__class__](node, args, place)
         if node.is_named_expression_type():
             self._pieces.set(node, args[0])
             return node

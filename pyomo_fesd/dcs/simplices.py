@@ -26,7 +26,7 @@ def choose(function, text, mesh, args, place):
 
 def _weights(text, mesh, args, place):
     """nu of every simplex; those that are there already, where the arguments are the same."""
-    home, time = place.meshes, place.time
+    home, time = place.shared.meshes, place.time
     for known, block in home.entries(time):
         if block.doc == text and all(map(compare_expressions, args, known)):
             return [block.nu[time, i] for i in block.regions]

@@ -1,4 +1,4 @@
-"""``fesd.dcs``: time-indexed Disjunctions become a dynamic complementarity system."""
+"""``fesd.dcs``: Disjunctions and functions in pieces over time become a dynamic complementarity system."""
 
 from contextlib import ExitStack
 from weakref import ref
@@ -15,7 +15,8 @@ from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import marks, records
 from pyomo_fesd.dcs import stewart, two_mode
-from pyomo_fesd.dcs.pieces import Pieces, image, source
+from pyomo_fesd.dcs.images import image, source
+from pyomo_fesd.dcs.pieces import Pieces
 from pyomo_fesd.dcs.system import Reader, refuse_logic_over_time
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
@@ -36,6 +37,9 @@ class DynamicComplementaritySystem(Transformation):
     with the conditions on nu as complementarity in the smallest form that fits: eq. (5) for two modes, eq. (3) for more.
     An equation that all modes share is not blended; a mode that is switched off leaves nothing; if only one mode is left, its
     constraints hold as they are.
+
+    Functions in pieces over time (``Piecewise``, ``PiecewiseLinearFunction``, ``Expr_if``) become complementarity too, by eq. (8)
+    where they are continuous and by eq. (5) where they jump.
 
     Works on a model before and after discretisation.  On a model that is not discretised yet, the later expansion by
     ``fesd.finite_elements`` continues with the new times.
@@ -83,12 +87,10 @@ class DynamicComplementaritySystem(Transformation):
         records.repeat_after_expansion(instance, 'fesd.dcs', wrt, targets=config.targets, form=config.form)
         records.rewrite_integrands(instance, 'fesd.dcs', wrt)
 
-    def rewrite(self, instance, wrt, expression, owner):
-        """``expression`` with its functions in pieces replaced: the integrand of ``owner``, which is built after this."""
-        with ExitStack() as undo:
-            expression = Pieces(_one_block(instance), TimeIndex(wrt), undo).replaced(expression, owner)
-            undo.pop_all()
-        return expression
+    def rewriter(self, instance, wrt, owner):
+        """A function that replaces the functions in pieces of an integrand of ``owner``, which is built after this."""
+        pieces = Pieces(_one_block(instance), TimeIndex(wrt), ExitStack())
+        return lambda expression: pieces.replaced(expression, owner)
 
     @staticmethod
     def _form(wanted, system):

@@ -12,7 +12,7 @@ from pyomo.dae import Integral
 
 from pyomo_fesd.elements.lengths import element_length
 from pyomo_fesd.errors import FesdError
-from pyomo_fesd.records import rewritten
+from pyomo_fesd.records import rewriter
 
 
 def integrals(block, wrt):
@@ -23,8 +23,8 @@ def integrals(block, wrt):
 
 def integrand(integral, wrt):
     """The function that the user integrates, each value built once and passed on to the transformations applied before."""
-    rule = _rule(integral)
-    return cache(lambda *args: rewritten(integral, wrt, rule(*args)))
+    rule, rewrite = _rule(integral), rewriter(integral, wrt)
+    return cache(lambda *args: rewrite(rule(*args)))
 
 
 def _rule(integral):

@@ -7,6 +7,7 @@ import pyomo.environ as pyo
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity, complements
 
@@ -186,6 +187,15 @@ def test_a_named_expression_is_changed_in_place_for_all_who_use_it():
     assert counts(m) == [3, 1, 2]
     assert all(c.active for c in (*m.one.values(), *m.two.values()))
     assert m.component('_pyomo_fesd_images') is None
+
+
+def test_a_condition_belongs_to_the_time_of_its_variables():
+    m = ode(lambda m, t: 0)
+    m.e = pyo.Expression(m.t, rule=lambda m, t: pyo.Expr_if(m.x[t] <= 1, 3, 1))
+    m.c = pyo.Constraint(m.t, rule=lambda m, t: m.y[t] <= 5 + m.e[0] + pyo.Expr_if(m.x[2] <= 1, 3, 1))
+    dcs(m)
+    assert [v.index() for v in m._pyomo_fesd_surfaces.x.step.alpha.values()] == [(0, 1.0), (2, 1.0)]
+    assert [c.name for c in identify_variables(m.e[0].expr)] == ['_pyomo_fesd_surfaces.x.step.alpha[0,1.0]']
 
 
 def test_an_objective_keeps_its_name():
