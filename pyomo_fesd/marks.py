@@ -6,10 +6,13 @@ A mark is a ``Suffix(direction=LOCAL)`` with one of the names below on the block
 =================  ========================  ===========================================================================
 mark               on                        value
 =================  ========================  ===========================================================================
-CONTINUOUS         Var                       the Constraint (of lam, mu, p, n) or Complementarity (of a kink's s) that ties it to
-                                             the states: continuous in time where the quantity that switches is
+CONTINUOUS         Var                       the Constraint (of lam, mu, p, n), Complementarity (of a kink's s) or Expression (the
+                                             arguments of the weights w) that ties it to the states: continuous in time where
+                                             the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
+SIDES              Var                       (name, {side: expression}) of the surface that it belongs to: positive where the
+                                             quantity is on this side
 MEMORY             Expression (data)         the conditions c >= 0 of a mode with memory; the Expression is its weight, 1 or 0 in an
                                              element; the mode goes on until a condition ends
 GUARD              Expression (data)         ``True``: a jump of the state happens where this falls to 0 from above
@@ -31,6 +34,7 @@ INDICATOR = 'fesd_indicator'
 MEMORY = 'fesd_memory'
 GUARD = 'fesd_guard'
 RESET = 'fesd_reset'
+SIDES = 'fesd_sides'
 DECIDED = 'fesd_decided'
 MOVE = 'fesd_move'
 ARTIFICIAL = 'fesd_artificial'

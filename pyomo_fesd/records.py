@@ -3,6 +3,8 @@
 Nothing here is needed to solve; all of it survives ``clone``.
 """
 
+from functools import reduce
+
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, TransformationFactory
@@ -17,14 +19,17 @@ class Records(AutoSlots.Mixin):
     ----------
     repeats : list of (name, block, ContinuousSet, keywords)
         transformations applied before discretisation
+    rewrites : list of (name, block, ContinuousSet)
+        transformations whose ``rewriter`` an integrand has to pass, since it is built after them
     grids : ComponentMap ContinuousSet -> Block
         the block with the element lengths of each moving grid
     """
 
-    __slots__ = ('repeats', 'grids')
+    __slots__ = ('repeats', 'rewrites', 'grids')
 
     def __init__(self):
         self.repeats = []
+        self.rewrites = []
         self.grids = ComponentMap()
 
 
@@ -49,3 +54,17 @@ def repeat(block, wrt):
         if over is wrt:
             TransformationFactory(name).apply_to(where, wrt=wrt, **keywords)
     records(block).repeats = [r for r in repeats if r[2] is not wrt]
+
+
+def rewrite_integrands(block, name, wrt):
+    """Remember that integrands over ``wrt`` that are built from now on have to pass transformation ``name``."""
+    rewrites = records(block).rewrites
+    if not any(n == name and where is block and over is wrt for n, where, over in rewrites):
+        rewrites.append((name, block, wrt))
+
+
+def rewriter(integral, wrt):
+    """A function that sends an integrand of ``integral`` through all that it has to pass."""
+    found = [(name, where) for name, where, over in records(integral).rewrites if over is wrt]
+    steps = [TransformationFactory(name).rewriter(where, wrt, integral) for name, where in found]
+    return lambda expression: reduce(lambda e, step: step(e), steps, expression)

@@ -188,7 +188,7 @@ def _mode_name(disjunction, disjunct, number, index):
 
 
 def switches(model, wrt=None):
-    """When which Disjunction, or hand-written Complementarity over time, changes its active set.
+    """When which Disjunction, surface of a function in pieces, or hand-written Complementarity over time changes its active set.
 
     An element of a moving grid has one active set (eq. 11), so switches lie on element boundaries.
 
@@ -199,7 +199,8 @@ def switches(model, wrt=None):
     """
     wrt = find_continuous_set(model, wrt, 'switches')
     grid, index, found = _grid(wrt), TimeIndex(wrt), Switches()
-    times, systems = physical_time(model, wrt), _multipliers(model, index) | conditions(model, wrt, index)
+    times = physical_time(model, wrt)
+    systems = _multipliers(model, index) | conditions(model, wrt, index) | _surfaces(model, index)
     for name, modes in systems.items():
         before = None
         for element in grid.elements:
@@ -225,3 +226,12 @@ def _active(modes, element):
     if not on:
         return None
     return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on)
+
+
+def _surfaces(model, index):
+    """Surfaces of functions in pieces as systems of two modes, the sides."""
+    found = {}
+    for v, (name, sides) in marks.marked(model, marks.SIDES):
+        for side, weight in sides.items():
+            found.setdefault(name, {}).setdefault(side, {})[index.time(v)] = weight
+    return found

@@ -10,7 +10,8 @@ def number(expr):
     """Value of ``expr`` at the present values of its variables; NaN where it has none."""
     try:
         found = None if expr is None else value(expr, exception=False)
-    except (ArithmeticError, ValueError):
+    except (ArithmeticError, ValueError, NotImplementedError):
+        # Pyomo cannot evaluate a PiecewiseLinearFunction
         found = None
     return nan if found is None or isinstance(found, complex) else found
 

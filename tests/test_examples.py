@@ -25,6 +25,7 @@ RADAU, LEGENDRE = 'LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE'
         ('saturating_valve', 't = 2.52605715: the valve follows'),
         ('flash', 'It boils from 37.89257'),
         ('projected_ellipse', 'time 0.42743'),
+        ('pump_curve', 'time 2.566377815: q = 30  above -> below'),
     ],
 )
 def test_example_says_what_it_found_and_draws(name, said, tmp_path, monkeypatch, capsys):

@@ -46,6 +46,12 @@ def add(block, index, system):
         for pattern in patterns:
             owner.append(mode)
             g.append(sum(-c if sign > 0 else c for sign, c in zip(pattern, system.regions.functions)))
+    nu = minimise(block, index, g)
+    return [sum(n for n, o in zip(nu, owner) if o == mode) for mode in range(len(system.modes))]
+
+
+def minimise(block, index, g):
+    """Add the linear program that puts the weight on the smallest of the functions g_i; returns nu."""
     nu = [block.nu[(*index, i)] for i in block.regions]
     lam = [block.lam[(*index, i)] for i in block.regions]
     mu = block.mu[index or None]
@@ -59,7 +65,7 @@ def add(block, index, system):
             # all but one: the last follows from the simplex
             marks.mark(block, marks.SELECTOR, nu[i])
     block.simplex.add(index or None, sum(nu) == 1)
-    return [sum(n for n, o in zip(nu, owner) if o == mode) for mode in range(len(system.modes))]
+    return nu
 
 
 def equations(block, index):

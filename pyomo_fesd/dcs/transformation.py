@@ -1,5 +1,6 @@
-"""``fesd.dcs``: time-indexed Disjunctions become a dynamic complementarity system."""
+"""``fesd.dcs``: Disjunctions and functions in pieces over time become a dynamic complementarity system."""
 
+from contextlib import ExitStack
 from weakref import ref
 
 from pyomo.common.autoslots import AutoSlots
@@ -14,6 +15,8 @@ from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import marks, records
 from pyomo_fesd.dcs import memory, stewart, two_mode
+from pyomo_fesd.dcs.images import image, source
+from pyomo_fesd.dcs.pieces import Pieces
 from pyomo_fesd.dcs.system import Reader, refuse_logic_over_time
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
@@ -34,6 +37,9 @@ class DynamicComplementaritySystem(Transformation):
     with the conditions on nu as complementarity in the smallest form that fits: eq. (5) for two modes, eq. (3) for more.
     An equation that all modes share is not blended; a mode that is switched off leaves nothing; if only one mode is left, its
     constraints hold as they are.
+
+    Functions in pieces over time (``Piecewise``, ``PiecewiseLinearFunction``, ``Expr_if``) become complementarity too, by eq. (8)
+    where they are continuous and by eq. (5) where they jump.
 
     Works on a model before and after discretisation.  On a model that is not discretised yet, the later expansion by
     ``fesd.finite_elements`` continues with the new times.
@@ -79,14 +85,23 @@ class DynamicComplementaritySystem(Transformation):
         for block in _blocks(instance, config.targets):
             refuse_logic_over_time(block, times.time)
         reader = Reader(derivatives(instance.model(), wrt), times)
-        with PauseGC():
+        with PauseGC(), ExitStack() as undo:
             remembered = ComponentSet(_disjunctions(instance, config.memory)) if config.memory else ()
+            inside = [disjunct for d in found if config.targets for disjunct in d.disjuncts if disjunct.active]
+            Pieces(_one_block(instance), times, undo).replace_all([*_blocks(instance, config.targets), *inside])
             systems = [memory.read(reader, d) if d in remembered else reader.read(d) for d in found]
             forms = [self._form(config.form, system) for system in systems]
+            undo.pop_all()
             for system, form in zip(systems, forms):
                 _add(system, form)
         keywords = {'targets': config.targets, 'form': config.form, 'memory': config.memory}
         records.repeat_after_expansion(instance, 'fesd.dcs', wrt, **keywords)
+        records.rewrite_integrands(instance, 'fesd.dcs', wrt)
+
+    def rewriter(self, instance, wrt, owner):
+        """A function that replaces the functions in pieces of an integrand of ``owner``, which is built after this."""
+        pieces = Pieces(_one_block(instance), TimeIndex(wrt), ExitStack())
+        return lambda expression: pieces.replaced(expression, owner)
 
     @staticmethod
     def _form(wanted, system):
@@ -114,14 +129,23 @@ class DynamicComplementaritySystem(Transformation):
         return _maps(component).disjunct[component]
 
     def get_src_constraint(self, component):
-        """The constraints of the disjuncts that a generated constraint blends (a list, one or more for each mode)."""
-        return _maps(component).sources[component]
+        """The constraints of the disjuncts that a generated constraint blends (a list, one or more for each mode).
+
+        For the image of a constraint or a Piecewise outside disjuncts, a list of this one.
+        """
+        if source(component) is not None:
+            return [source(component)]
+        return [con if source(con) is None else source(con) for con in _maps(component).sources[component]]
 
     def get_transformed_constraints(self, constraint):
-        """The generated constraints that took the place of a disjunct's ``constraint``."""
+        """The generated constraints that took the place of a ``constraint`` of a disjunct, or of one with functions in pieces."""
+        alone = image(constraint)
+        constraint = constraint if alone is None else alone
         disjunct = constraint.parent_block()
-        while disjunct.ctype is not Disjunct:
+        while disjunct is not None and disjunct.ctype is not Disjunct:
             disjunct = disjunct.parent_block()
+        if disjunct is None:
+            return [] if alone is None else [alone]
         block = disjunct.transformation_block
         return [] if block is None else block.private_data('pyomo_fesd.dcs').images.get(constraint, [])
 
@@ -149,6 +173,11 @@ Block.register_private_data_initializer(_Maps, scope='pyomo_fesd.dcs')
 
 def _maps(component):
     return component.parent_block().private_data('pyomo_fesd.dcs')
+
+
+def _one_block(instance):
+    """The block that holds what belongs to all of ``instance``."""
+    return instance if isinstance(instance, BlockData) else instance.parent_block()
 
 
 def _blocks(instance, targets):

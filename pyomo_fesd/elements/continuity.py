@@ -14,7 +14,6 @@ from functools import partial
 
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Constraint, Param, Var
-from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
 from pyomo_fesd.elements.equations import Equations, rule_of, variables_of
@@ -28,7 +27,7 @@ class Continuity:
 
     Attributes
     ----------
-    rules : ComponentMap Var -> Constraint or Complementarity
+    rules : ComponentMap Var -> Constraint, Complementarity or Expression
         what ties each marked variable to the states
     inside : Known
         continuous inside every control stage
@@ -138,7 +137,7 @@ def read_continuity(model, times, labels, held, told, trace):
         whether algebraic variables matter in any case: they do not where ``fesd.dcs`` wrote every condition, on a single stage
     """
     rules = ComponentMap(marks.marked(model, marks.CONTINUOUS))
-    trace = trace or any(r.ctype is Complementarity for r in rules.values())
+    trace = trace or any(r.ctype is not Constraint for r in rules.values())
     equations = Equations(model, times, labels, rules) if trace else None
     start, held = [*(d.get_state_var() for d in derivatives(model, times.wrt)), *each(told)], each(held)
     inside = _closure(Known(_is_fixed, start, held), rules, equations)
@@ -184,10 +183,5 @@ def _closure(known, rules, equations):
     known.given.update(v for v, rule in rules.items() if rule.ctype is Constraint)
     if equations is None:
         return known
-    kinks = [kink for v, rule in rules.items() if rule.ctype is Complementarity for kink in equations.kinks(v, rule)]
-    while True:
-        known.tied.update(equations.tied(known))
-        ready = [s for s, variables in kinks if s not in known and all(v in known for v in variables)]
-        if not ready:
-            return known
-        known.given.update(ready)
+    known.tied.update(equations.tied(known))
+    return known

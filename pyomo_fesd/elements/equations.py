@@ -7,12 +7,13 @@ Does not apply: to inequalities, and to the equations of pyomo.dae's discretisat
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, Constraint
+from pyomo.core import Block, Constraint, Expression
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
+from pyomo_fesd.complementarity import side
 from pyomo_fesd.timeindex import DISCRETISATION
 from pyomo_fesd.values import mutable_parameters
 
@@ -29,20 +30,27 @@ def rule_of(v, rules):
 
 
 class Equations:
-    """The algebraic equations of a few times, with the variables that they contain; without the rules of marked variables.
+    """The algebraic equations of a few times, with the variables that they contain; without the rules of p, n, lam and mu.
 
-    These say that p and n are as continuous as the quantity that switches, and not the other way round.
+    These say that p and n are as continuous as the quantity that switches, and not the other way round.  A continuous function is
+    an equation: the condition of a kink says s = max(0, z), the weights of a mesh follow from its arguments.  So it may be part
+    of an implicit one.
     """
 
     def __init__(self, model, times, labels, rules):
         self._times, self._labels = times, labels
-        apart = ComponentSet(rules.values())
+        functions = [(v, rule) for v, rule in rules.items() if rule.ctype is not Constraint]
+        apart = ComponentSet(rule for rule in rules.values() if rule.ctype is Constraint)
+        # what a function of its arguments is made of says nothing of the arguments
+        inside = ComponentSet(rule.parent_block() for _, rule in functions if rule.ctype is Expression)
         constraints = model.component_data_objects(Constraint, active=True, descend_into=Block)
         self._rows = [
             (c.body, [v for v in variables_of(c.expr) if times.time(v) is not None])
             for c in constraints
-            if c.equality and times.time(c) in labels and _is_model(c.parent_component(), apart)
+            if c.equality and times.time(c) in labels and _is_model(c.parent_component(), apart) and c.parent_block() not in inside
         ]
+        for component, rule in functions:
+            self._rows += list(self._function(component, rule))
 
     def _data(self, component):
         return (d for d in component.values() if self._times.time(d) in self._labels)
@@ -51,12 +59,18 @@ class Equations:
         """Whether a Constraint contains a variable for which ``test`` is true."""
         return any(test(v) for c in self._data(rule) for v in variables_of(c.expr))
 
-    def kinks(self, component, condition):
-        """``(s, variables of z)`` for every s = max(0, z) of a marked component at these times."""
-        for s in self._data(component):
-            # pyomo.dae gives a Var all its indices, also those without a condition
-            if s.index() in condition:
-                yield s, [v for side in condition[s.index()]._args for v in variables_of(side) if v is not s]
+    def _function(self, component, rule):
+        """A row for every value of a function at these times: its variable and those of the arguments."""
+        for v in self._data(component):
+            if rule.ctype is Expression:
+                same = self._times.time(v)
+                arguments = [e.expr for e in rule.values() if e.expr is not None and self._times.time(e) == same]
+            else:
+                # pyomo.dae gives a Var all its indices, also those without a condition
+                arguments = [side(a).body for a in rule[v.index()]._args] if v.index() in rule else []
+            if arguments:
+                found = ComponentSet([v, *(u for e in arguments for u in variables_of(e))])
+                yield arguments[-1], [u for u in found if self._times.time(u) is not None]
 
     def tied(self, known):
         """Variables that equations tie to known ones.
@@ -98,7 +112,10 @@ class Equations:
         """What defines one variable: a mark's rule, or the equation that is matched with it."""
         rule = rule_of(v, rules)
         if rule is not None and rule.ctype is Complementarity:
-            return rule[v.index()]._args
+            return [side(a).body for a in rule[v.index()]._args]
+        if rule is not None and rule.ctype is Expression:
+            same = self._times.time(v)
+            return [e.expr for e in rule.values() if e.expr is not None and self._times.time(e) == same]
         if rule is not None:
             return [c.body for c in self._data(rule) if any(u is v for u in identify_variables(c.body))]
         return [self._rows[row_of[columns[v]]][0]] if v in columns and row_of[columns[v]] >= 0 else []

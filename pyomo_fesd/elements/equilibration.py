@@ -78,9 +78,6 @@ def add_equilibration(block, families, modes, grid, mode, rho):
 
 def _unchanged(block, families, n, m):
     """pi_i of every family between elements n and m = n + 1."""
-    pairs = [
-        (block.theta[f.name, n], block.theta[f.name, m])
-        for f in families
-        if (f.name, n) in block.theta and (f.name, m) in block.theta
-    ]
-    return [a * b + (1 - a) * (1 - b) for a, b in pairs]
+    pairs = [(block.theta[f.name, n], block.theta[f.name, m]) for f in families]
+    # a family that is not there in one of them does not tell
+    return [a * b + (1 - a) * (1 - b) for a, b in pairs if a.expr is not None and b.expr is not None]

@@ -5,11 +5,14 @@
 pyomo.dae itself uses the trapezoid rule on the labels, which is wrong as soon as an element moves.
 """
 
+from functools import cache
+
 from pyomo.core import Block, Expression
 from pyomo.dae import Integral
 
 from pyomo_fesd.elements.lengths import duration
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.records import rewriter
 
 
 def integrals(block, wrt):
@@ -18,8 +21,14 @@ def integrals(block, wrt):
     return [c for c in found if isinstance(c, Integral) and c.get_continuousset() is wrt]
 
 
-def integrand(integral):
-    """The function that the user integrates; pyomo.dae keeps it inside the rule that it builds."""
+def integrand(integral, wrt):
+    """The function that the user integrates, each value built once and passed on to the transformations applied before."""
+    rule, rewrite = _rule(integral), rewriter(integral, wrt)
+    return cache(lambda *args: rewrite(rule(*args)))
+
+
+def _rule(integral):
+    """The user's own function; pyomo.dae keeps it inside the rule that it builds."""
     try:
         return integral._rule._fcn.__globals__['rule']
     except (AttributeError, KeyError):

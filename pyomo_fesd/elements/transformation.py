@@ -177,7 +177,13 @@ class FiniteElements(Transformation):
             records.repeat(instance, wrt)
             check_orders(instance.model(), wrt)
             sigma = factors(config.final_time, config.stage_lengths, stages)
-            integrands = [(i, integrand(i)) for i in integrals(instance.model(), wrt)]
+            block = self._block(instance, wrt)
+            set_grid(block, grid)
+            add_lengths(block, grid, config.length_bounds, sigma)
+            integrands = [(i, integrand(i, wrt)) for i in integrals(instance.model(), wrt)]
+            for integral, rule in integrands:
+                # first of all: functions in pieces inside an integrand have conditions of their own
+                rebuild(integral, rule, block, grid)
             warn_explicit_time(instance, wrt, grid, integrands)
 
             pairs, mixed = conditions_over_time(instance, times)
@@ -188,11 +194,6 @@ class FiniteElements(Transformation):
             if not grid.right_is_stage:
                 warn_gauss_on_curved_surfaces(families, continuity, times)
 
-            block = self._block(instance, wrt)
-            set_grid(block, grid)
-            add_lengths(block, grid, config.length_bounds, sigma)
-            for integral, rule in integrands:
-                rebuild(integral, rule, block, grid)
             hold_controls(block, config.piecewise_constant, grid, wrt)
             multiply_derivatives(instance.model(), wrt, block, grid)
             add_jumps(block, jumps, grid, wrt)

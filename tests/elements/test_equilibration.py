@@ -1,12 +1,14 @@
 """Step equilibration: equal lengths where nothing switches (theory, eq. 12 and 13)."""
 
+from math import exp
+
 import numpy as np
 import oscillator
 import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 import signum
-from pyomo.mpec import Complementarity
+from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
 from tests.problems import crossing, free_start, held_control, sliding, two_systems, weir
@@ -195,3 +197,18 @@ def test_a_model_without_conditions_gets_no_equilibration():
     m.dx = dae.DerivativeVar(m.x)
     move(m)
     assert not list(m.component_data_objects(Complementarity))
+
+
+def test_a_condition_may_be_there_in_one_stage_only():
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(initialize=[0, 1, 2])
+    m.x = pyo.Var(m.t, initialize=-1.5)
+    m.dx = dae.DerivativeVar(m.x)
+    m.x[0].fix(-1.5)
+    m.s = pyo.Var(m.t, bounds=(0, None), initialize=0)
+    m.ode = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == 1 + m.s[t])
+    m.off = pyo.Constraint(m.t, rule=lambda m, t: m.s[t] == 0 if t <= 1 else pyo.Constraint.Skip)
+    m.on = Complementarity(m.t, rule=lambda m, t: complements(m.s[t] >= 0, m.s[t] - m.x[t] >= 0) if t > 1 else Complementarity.Skip)
+    solve(move(m, 8, 3, continuous=[m.s]))
+    # 0 at 1.5, then dx = 1 + x
+    assert m.x[2].value == pytest.approx(exp(0.5) - 1, abs=1e-6)
