@@ -10,6 +10,8 @@ CONTINUOUS         Var                       the Constraint (of lam, mu, p, n) o
                                              states: continuous in time where the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
+REPLACED           Disjunct,                 ``True``: switched off because the logic between modes says so, not by the user, so its
+                   LogicalConstraint (data)  new times are not switched off too
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
 ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
                                              certificate looks beyond them
@@ -22,6 +24,7 @@ from pyomo.core import Block, Suffix
 CONTINUOUS = 'fesd_continuous'
 SELECTOR = 'fesd_selector'
 INDICATOR = 'fesd_indicator'
+REPLACED = 'fesd_replaced'
 DECIDED = 'fesd_decided'
 ARTIFICIAL = 'fesd_artificial'
 PENALTY = 'fesd_penalty'

@@ -13,13 +13,15 @@ from pyomo.core.util import target_list
 from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import marks, records
-from pyomo_fesd.dcs import stewart, two_mode
-from pyomo_fesd.dcs.system import Reader, refuse_logic_over_time
+from pyomo_fesd.dcs import heaviside, stewart, two_mode
+from pyomo_fesd.dcs.logic import add_exclusions, modes_left, read_exclusions, read_logic
+from pyomo_fesd.dcs.nested import Nesting
+from pyomo_fesd.dcs.system import Reader, refuse_twice_defined
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
 
-#: The forms, smallest first: 'auto' takes the first that applies.
-FORMS = {form.NAME: form for form in (two_mode, stewart)}
+#: The forms: 'auto' takes the smallest that applies, the first of those as small.
+FORMS = {form.NAME: form for form in (two_mode, stewart, heaviside)}
 
 
 @TransformationFactory.register('fesd.dcs', doc="Time-indexed Disjunctions to a dynamic complementarity system (Filippov)")
@@ -31,9 +33,10 @@ class DynamicComplementaritySystem(Transformation):
 
         v = sum_i nu_i f_i,   sum_i nu_i = 1,   nu_i >= 0,   nu_i = 0 outside the closure of R_i
 
-    with the conditions on nu as complementarity in the smallest form that fits: eq. (5) for two modes, eq. (3) for more.
+    with the conditions on nu as complementarity in the smallest form that fits: eq. (5) for two modes, eq. (3) or (6) for more.
     An equation that all modes share is not blended; a mode that is switched off leaves nothing; if only one mode is left, its
-    constraints hold as they are.
+    constraints hold as they are.  Nested Disjunctions are one system, whose modes are the ways down to an innermost disjunct.
+    LogicalConstraints over time between the indicators of modes switch modes off, or become pairs that exclude combinations.
 
     Works on a model before and after discretisation.  On a model that is not discretised yet, the later expansion by
     ``fesd.finite_elements`` continues with the new times.
@@ -57,7 +60,7 @@ class DynamicComplementaritySystem(Transformation):
         ConfigValue(
             default='auto',
             domain=In(['auto', *FORMS]),
-            description="'two_mode' (eq. 5), 'stewart' (eq. 3), or 'auto': the smallest that fits",
+            description="'two_mode' (eq. 5), 'stewart' (eq. 3), 'heaviside' (eq. 6), or 'auto': the smallest that fits",
         ),
     )
 
@@ -66,29 +69,34 @@ class DynamicComplementaritySystem(Transformation):
         config.set_value(kwds)
         wrt = find_continuous_set(instance, config.wrt, 'fesd.dcs')
         times = TimeIndex(wrt)
-        found = [d for d in _disjunctions(instance, config.targets) if times.time(d) is not None]
-        for block in _blocks(instance, config.targets):
-            refuse_logic_over_time(block, times.time)
+        nesting = Nesting(instance.model(), times)
+        found = [d for d in _disjunctions(instance, config.targets, nesting) if times.time(d) is not None]
         reader = Reader(derivatives(instance.model(), wrt), times)
+        defined = instance.model().private_data('pyomo_fesd.dcs').defined
         with PauseGC():
-            systems = [reader.read(d) for d in found]
+            trees = [nesting.tree(d) for d in found]
+            propositions = read_logic(_blocks(instance, config.targets), trees, times)
+            modes = modes_left(trees, propositions)
+            systems = [reader.read(tree, modes[tree]) for tree in trees]
+            refuse_twice_defined(systems, defined)
+            exclusions = read_exclusions(propositions, systems)
             forms = [self._form(config.form, system) for system in systems]
-            for system, form in zip(systems, forms):
-                _add(system, form)
+            weights = {system.tree: _add(system, form, defined) for system, form in zip(systems, forms)}
+            for constraint in (p.constraint for p in propositions):
+                own = [e for e in exclusions if e.constraint is constraint]
+                add_exclusions(_dcs_block(constraint.parent_block()), constraint, own, weights)
         records.repeat_after_expansion(instance, 'fesd.dcs', wrt, targets=config.targets, form=config.form)
 
     @staticmethod
     def _form(wanted, system):
         if len(system.modes) == 1:
             return None
-        for name, form in FORMS.items():
-            if wanted in ('auto', name) and form.applies(system):
-                return form
-        raise FesdError(
-            system.disjunction,
-            f"form='{wanted}' does not fit: {len(system.modes)} modes with {len(system.regions.functions)} switching function(s)",
-            "use form='auto'",
-        )
+        if wanted == 'auto':
+            return min((form for form in FORMS.values() if form.applies(system)), key=lambda form: form.count(system))
+        form = FORMS[wanted]
+        if not form.applies(system):
+            raise FesdError(system.disjunction, f"form='{wanted}' does not fit: {form.why_not(system)}", "use form='auto'")
+        return form
 
     # Pyomo's names for the reverse maps
 
@@ -97,7 +105,10 @@ class DynamicComplementaritySystem(Transformation):
         return _maps(component).disjunction[component]
 
     def get_src_disjunct(self, component):
-        """The DisjunctData whose multiplier a generated complementarity holds."""
+        """The DisjunctData whose multiplier a generated complementarity holds.
+
+        A step variable of the Heaviside form that is no mode's own multiplier has none: ``KeyError``.
+        """
         return _maps(component).disjunct[component]
 
     def get_src_constraint(self, component):
@@ -114,21 +125,23 @@ class DynamicComplementaritySystem(Transformation):
 
     def get_multipliers(self, disjunction):
         """nu of a transformed DisjunctionData: a ComponentMap from its disjuncts to expressions."""
-        block = _dcs_block(disjunction)
-        marked = ComponentMap(marks.marked(block, marks.INDICATOR)) if block is not None else ComponentMap()
+        blocks = ComponentSet(d.transformation_block for d in disjunction.disjuncts if d.transformation_block is not None)
+        marked = ComponentMap(item for block in blocks for item in marks.marked(block, marks.INDICATOR))
         return ComponentMap((d, marked[d]) for d in disjunction.disjuncts if d in marked)
 
 
 class _Maps(AutoSlots.Mixin):
     """Where the generated components came from; kept as private data of the block that holds them."""
 
-    __slots__ = ('disjunction', 'disjunct', 'sources', 'images')
+    __slots__ = ('disjunction', 'disjunct', 'sources', 'images', 'defined')
 
     def __init__(self):
         self.disjunction = ComponentMap()
         self.disjunct = ComponentMap()
         self.sources = ComponentMap()
         self.images = ComponentMap()
+        #: on the model: the DisjunctionData that defines a variable
+        self.defined = ComponentMap()
 
 
 Block.register_private_data_initializer(_Maps, scope='pyomo_fesd.dcs')
@@ -145,16 +158,20 @@ def _blocks(instance, targets):
             yield from target.values() if not isinstance(target, BlockData) else [target]
 
 
-def _disjunctions(instance, targets):
-    """Active DisjunctionData of the targets, in declaration order."""
+def _disjunctions(instance, targets, nesting):
+    """Active DisjunctionData of the targets that are not nested, in declaration order."""
     for target in targets or [instance]:
         if target.model() is not instance.model():
             raise FesdError(target, "fesd.dcs: this target belongs to another model", "give a component of the model itself")
         if target.ctype is Disjunction:
-            yield from (d for d in (target.values() if hasattr(target, 'values') else [target]) if d.active)
+            for disjunction in target.values() if hasattr(target, 'values') else [target]:
+                if disjunction.active:
+                    nesting.refuse_nested(disjunction)
+                    yield disjunction
         elif target.ctype is Block:
             for block in _blocks(instance, [target]):
-                yield from block.component_data_objects(Disjunction, active=True, descend_into=Block)
+                below = block.component_data_objects(Disjunction, active=True, descend_into=Block)
+                yield from (d for d in below if nesting.host(d) is None)
         else:
             raise FesdError(
                 target,
@@ -163,30 +180,28 @@ def _disjunctions(instance, targets):
             )
 
 
-def _dcs_block(disjunction):
-    """The block of everything generated on the parent of ``disjunction``; None before."""
-    return disjunction.parent_block().component(marks.GENERATED + 'dcs')
+def _dcs_block(parent):
+    """The block on ``parent`` for everything generated beside its components."""
+    name = marks.GENERATED + 'dcs'
+    if parent.component(name) is None:
+        parent.add_component(name, Block())
+    return parent.component(name)
 
 
 def _form_block(system, form):
     """The block that holds one form of one Disjunction; made at its first time."""
-    disjunction = system.disjunction
-    component, parent = disjunction.parent_component(), disjunction.parent_block()
-    if _dcs_block(disjunction) is None:
-        parent.add_component(marks.GENERATED + 'dcs', Block())
+    component, home = system.disjunction.parent_component(), _dcs_block(system.disjunction.parent_block())
     name = component.local_name
     if form is None:
         name += '_single_mode'
     elif form is not two_mode:
         name += f'_{form.NAME}_{form.size(system)}'
-    block = _dcs_block(disjunction).component(name)
+    block = home.component(name)
     if block is None:
         block = Block()
-        _dcs_block(disjunction).add_component(name, block)
+        home.add_component(name, block)
         index = (component.index_set(),) if component.is_indexed() else ()
-        if form is two_mode:
-            form.declare(block, index)
-        elif form is not None:
+        if form is not None:
             form.declare(block, index, form.size(system))
         block.numbers = Set(dimen=1)
         block.mode = Constraint(*index, block.numbers)
@@ -197,7 +212,7 @@ def _form_block(system, form):
 
 def _number_of_equations(system):
     if system.equations is None:
-        return sum(1 for _ in system.modes[0].component_data_objects(Constraint, active=True, descend_into=Block))
+        return sum(1 for _ in system.modes[0].constraints())
     return len(system.equations.defined)
 
 
@@ -207,37 +222,56 @@ def _index(disjunction):
     return () if index is None else index if isinstance(index, tuple) else (index,)
 
 
-def _add(system, form):
-    """Generate everything for one Disjunction at one time, and switch the source off."""
+def _add(system, form, defined):
+    """Generate everything for one Disjunction at one time, and switch the source off.
+
+    Returns
+    -------
+    callable
+        the sum of the multipliers of some modes, given by their numbers
+    """
     block, index = _form_block(system, form), _index(system.disjunction)
+
+    def weight(modes):
+        return 1.0 if len(modes) == len(system.modes) else form.weight(block, index, system, modes)
+
     if form is None:
         _impose_only_mode(block, index, system)
     else:
-        weights = form.add(block, index, system)
-        _blend(block, index, system, weights)
-        for disjunct, weight in zip(system.modes, weights):
-            marks.mark(block, marks.INDICATOR, disjunct, weight)
+        form.add(block, index, system)
+        _blend(block, index, system, weight)
+        _mark_indicators(block, system, weight)
         _map_form(block, index, system, form)
+        defined.update((v, system.disjunction) for v in system.equations.defined)
     _switch_off(block, system)
+    return weight
 
 
 def _impose_only_mode(block, index, system):
     """One mode left: its equations and its region simply hold."""
-    (disjunct,) = system.modes
-    constraints = disjunct.component_data_objects(Constraint, active=True, descend_into=Block)
-    for j, con in enumerate(constraints, start=1):
+    (mode,) = system.modes
+    for j, con in enumerate(mode.constraints(), start=1):
         _connect(block, block.mode.add((*index, j), con.expr), system, [con])
 
 
-def _blend(block, index, system, weights):
+def _mark_indicators(block, system, weight):
+    """nu of every disjunct: the sum over the modes that it is part of."""
+    for disjunct in system.tree.disjuncts():
+        modes = [i for i, mode in enumerate(system.modes) if disjunct in mode]
+        if modes:
+            marks.mark(block, marks.INDICATOR, disjunct, weight(modes))
+
+
+def _blend(block, index, system, weight):
     """v = sum_i nu_i f_i (eq. 7); v = f where all modes agree; mode copies of v where a mode is implicit."""
     equations = system.equations
     copies = [_copies(block, index, system, i) if None in f else f for i, f in enumerate(equations.rhs)]
     for j, v in enumerate(equations.defined):
-        if equations.shared(j):
-            expr = copies[0][j]
+        alike = [(modes, copies[modes[0]][j]) for modes in equations.alike(j)]
+        if len(alike) == 1:
+            expr = alike[0][1]
         else:
-            expr = sum(w * f[j] for w, f in zip(weights, copies) if not (isinstance(f[j], (int, float)) and f[j] == 0))
+            expr = sum(weight(modes) * f for modes, f in alike if not (isinstance(f, (int, float)) and f == 0))
         _connect(block, block.mode.add((*index, j + 1), v == expr), system, [con for used in equations.used for con in used[j]])
 
 
@@ -272,19 +306,22 @@ def _map_form(block, index, system, form):
     maps = block.private_data('pyomo_fesd.dcs')
     for con in form.equations(block, index):
         maps.disjunction[con] = system.disjunction
-    owners = [d for d, patterns in zip(system.modes, system.regions.patterns) for _ in patterns]
-    for i, disjunct in enumerate(owners, start=1):
+    for i, mode in enumerate(form.owners(system), start=1):
         condition = block.complementarity[(*index, i)]
         maps.disjunction[condition] = system.disjunction
-        maps.disjunct[condition] = disjunct
+        if mode is not None and len(system.modes[mode].innermost) == 1:
+            (maps.disjunct[condition],) = system.modes[mode].innermost
 
 
 def _switch_off(block, system):
     """The sources keep their contents, inactive, as after Pyomo's own GDP transformations."""
-    system.disjunction.deactivate()
-    for disjunct in system.disjunction.disjuncts:
-        if disjunct.active and disjunct not in ComponentSet(system.modes):
+    for disjunction in (system.disjunction, *system.tree.nested):
+        disjunction.deactivate()
+    for disjunct in system.tree.disjuncts():
+        if any(disjunct in mode for mode in system.modes):
+            disjunct._deactivate_without_fixing_indicator()
+            disjunct._transformation_block = ref(block)
+        elif disjunct.active:
+            if any(disjunct in mode for mode in system.tree.modes):
+                marks.mark(block, marks.REPLACED, disjunct)
             disjunct.deactivate()
-    for disjunct in system.modes:
-        disjunct._deactivate_without_fixing_indicator()
-        disjunct._transformation_block = ref(block)
