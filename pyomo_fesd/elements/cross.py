@@ -61,6 +61,8 @@ class Family:
         what ties the continuous side to the states, where it is a marked variable
     jumps_with_controls : bool
         the continuous side contains a control that is held on each stage: no continuity from one stage to the next
+    follows : bool
+        both sides are functions of multipliers that jump: it switches only where the conditions of these do
     """
 
     name: str
@@ -69,6 +71,7 @@ class Family:
     continuous: tuple
     rule: object = None
     jumps_with_controls: bool = False
+    follows: bool = False
 
     def points(self, element):
         """Stage labels of ``element`` at which the condition exists."""
@@ -115,7 +118,8 @@ def read_families(block, wrt, controls, told=()):
             )
         inner = next((t for t in wrt if t in sides and t != wrt.first()), None)
         smooth = tuple(map(continuity.holds, sides[inner])) if inner is not None else (False, False)
-        if inner is not None and not any(smooth):
+        follows = inner is not None and not any(smooth) and all(map(_of_multipliers, sides[inner]))
+        if inner is not None and not any(smooth) and not follows:
             logger.warning(
                 "%s: neither side is known to be continuous in time, so a switch inside an element may go unnoticed. Write one "
                 "side by differential states, or by variables that equations tie to them; or name its variables with the keyword "
@@ -126,8 +130,13 @@ def read_families(block, wrt, controls, told=()):
             sides, smooth = {t: (H, G) for t, (G, H) in sides.items()}, (False, True)
         lam = sides[inner][1] if smooth[1] else None
         rule, jumps = (continuity.rule(lam), continuity.jumps_at_stages(lam)) if smooth[1] else (None, False)
-        families.append(Family(_public_name(name), conditions, sides, smooth, rule, jumps))
+        families.append(Family(_public_name(name), conditions, sides, smooth, rule, jumps, follows))
     return families
+
+
+def _of_multipliers(expr):
+    """Whether a side contains generated variables only."""
+    return all(map(marks.is_generated, identify_variables(expr)))
 
 
 def warn_gauss_on_curved_surfaces(families):

@@ -7,7 +7,7 @@ theta_n = G_n/(G_n + H_n) is 1 or 0, whatever the scale of lam, so
 
 is 1 where the active set goes on and 0 where it changes.  (The raw product B_lam F_lam + B_nu F_nu vanishes with h.)
 
-Takes: the families of ``cross``.
+Takes: the families of ``cross`` that switch by themselves.
 Leaves: ``eta``, ``equal_length`` (inactive), ``equilibration`` (a Complementarity), ``deviation`` (the penalty term).
 """
 
@@ -51,6 +51,7 @@ MODES = {'two_stage': two_stage, 'complementarity': complementarity, 'penalty': 
 
 def add_equilibration(block, families, grid, mode, rho):
     """Add eta and the equilibration pairs between consecutive elements of each control stage."""
+    families = [f for f in families if not f.follows]
     by_number = {e.n: e for e in grid.elements}
     inner = [(e.n, f.n) for elements in grid.stages.values() for e, f in zip(elements, elements[1:])]
     block.theta = Expression(block.family, block.element)
