@@ -6,12 +6,12 @@ A mark is a ``Suffix(direction=LOCAL)`` with one of the names below on the block
 =================  ========================  ===========================================================================
 mark               on                        value
 =================  ========================  ===========================================================================
-CONTINUOUS         Var                       the Constraint (of lam, mu, p, n) or Complementarity (of a kink's s) that ties it to the
-                                             states: continuous in time where the quantity that switches is
+CONTINUOUS         Var                       the Constraint (of lam, mu, p, n) or Complementarity (of a kink's s) that ties it to
+                                             the states: continuous in time where the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
-REPLACED           Disjunct,                 ``True``: switched off because the logic between modes says so, not by the user, so its
-                   LogicalConstraint (data)  new times are not switched off too
+REPLACED           Disjunct,                 ``True``: switched off by logic between modes and not by the user, so new times of
+                   LogicalConstraint (data)  it are not switched off too
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
 ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
                                              certificate looks beyond them

@@ -67,7 +67,7 @@ class Proposition:
 class Exclusion:
     """Modes of two systems that exclude one another: ``((tree, mode numbers), (tree, mode numbers))``."""
 
-    constraint: object
+    proposition: Proposition
     sides: tuple
 
 
@@ -153,7 +153,6 @@ def modes_left(trees, propositions):
             table = proposition.among(modes)
             for axis, tree in enumerate(proposition.trees):
                 modes[tree] = list(compress(modes[tree], _onto(table, axis)))
-                table = proposition.among(modes)
     return modes
 
 
@@ -178,7 +177,7 @@ def _exclusions(proposition, systems, cache):
         for i, j in np.argwhere(excluded):
             excluded[i, j] = possible({a: i, b: j})
         for of_a, of_b in _rectangles(excluded):
-            yield Exclusion(proposition.constraint, ((involved[a].tree, of_a), (involved[b].tree, of_b)))
+            yield Exclusion(proposition, ((involved[a].tree, of_a), (involved[b].tree, of_b)))
 
 
 def _refuse_larger(constraint, systems, table, possible):
@@ -209,22 +208,25 @@ def _equal_rows(matrix):
     return [(rows, list(columns)) for columns, rows in groups.items() if columns]
 
 
-def add_exclusions(home, constraint, exclusions, weights):
+def replace_logic(home, proposition, exclusions, weights):
     """Put the pairs of one LogicalConstraint on the block ``home`` beside it, and switch it off.
 
     Parameters
     ----------
+    exclusions : list of Exclusion
+        those of all propositions
     weights : dict Tree -> callable
         gives the sum of the multipliers of some modes of a system, by their numbers
     """
-    if exclusions:
-        component, index = constraint.parent_component(), constraint.index()
-        index = () if index is None else index if isinstance(index, tuple) else (index,)
-        block = _block(home, component)
-        for number, exclusion in enumerate(exclusions, start=1):
-            block.numbers.add(number)
-            G, H = (weights[tree](modes) for tree, modes in exclusion.sides)
-            block.exclusion.add((*index, number), complements(G >= 0, H >= 0))
+    constraint = proposition.constraint
+    index = constraint.index()
+    index = () if index is None else index if isinstance(index, tuple) else (index,)
+    own = [exclusion for exclusion in exclusions if exclusion.proposition is proposition]
+    for number, exclusion in enumerate(own, start=1):
+        block = _block(home, constraint.parent_component())
+        block.numbers.add(number)
+        G, H = (weights[tree](modes) for tree, modes in exclusion.sides)
+        block.exclusion.add((*index, number), complements(G >= 0, H >= 0))
     marks.mark(home, marks.REPLACED, constraint)
     constraint.deactivate()
 

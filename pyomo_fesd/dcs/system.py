@@ -22,7 +22,6 @@ class System:
 
     Attributes
     ----------
-    disjunction : DisjunctionData
     tree : Tree
         the Disjunction with those nested in it
     modes : list of Mode
@@ -32,11 +31,15 @@ class System:
         both None where only one mode is left: its constraints then simply hold
     """
 
-    disjunction: object
     tree: Tree
     modes: list
     regions: Regions
     equations: ModeEquations
+
+    @property
+    def disjunction(self):
+        """The outermost DisjunctionData."""
+        return self.tree.disjunction
 
 
 #: What a disjunct over time cannot contain, and what to do about it.
@@ -79,7 +82,7 @@ class Reader:
         for disjunct in ComponentSet(d for mode in modes for d in mode.disjuncts):
             self._refuse_contents(disjunct, known)
         if len(modes) == 1:
-            return System(disjunction, tree, modes, None, None)
+            return System(tree, modes, None, None)
         split = [_constraints(mode) for mode in modes]
         for mode, (equalities, inequalities) in zip(modes, split):
             mentioned = (v for c in (*equalities, *inequalities) for v in identify_variables(c.body))
@@ -91,7 +94,7 @@ class Reader:
         equations = read_equations(disjunction, modes, equalities, self.is_derivative, self.is_state, choice)
         regions = read_regions(disjunction, modes, inequalities, patterns)
         _refuse_defined_in_regions(disjunction, regions, equations)
-        return System(disjunction, tree, modes, regions, equations)
+        return System(tree, modes, regions, equations)
 
     @staticmethod
     def _refuse_contents(disjunct, known):

@@ -14,7 +14,7 @@ from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import marks, records
 from pyomo_fesd.dcs import heaviside, stewart, two_mode
-from pyomo_fesd.dcs.logic import add_exclusions, modes_left, read_exclusions, read_logic
+from pyomo_fesd.dcs.logic import modes_left, read_exclusions, read_logic, replace_logic
 from pyomo_fesd.dcs.nested import Nesting
 from pyomo_fesd.dcs.system import Reader, refuse_twice_defined
 from pyomo_fesd.errors import FesdError
@@ -82,9 +82,8 @@ class DynamicComplementaritySystem(Transformation):
             exclusions = read_exclusions(propositions, systems)
             forms = [self._form(config.form, system) for system in systems]
             weights = {system.tree: _add(system, form, defined) for system, form in zip(systems, forms)}
-            for constraint in (p.constraint for p in propositions):
-                own = [e for e in exclusions if e.constraint is constraint]
-                add_exclusions(_dcs_block(constraint.parent_block()), constraint, own, weights)
+            for proposition in propositions:
+                replace_logic(_dcs_block(proposition.constraint.parent_block()), proposition, exclusions, weights)
         records.repeat_after_expansion(instance, 'fesd.dcs', wrt, targets=config.targets, form=config.form)
 
     @staticmethod
