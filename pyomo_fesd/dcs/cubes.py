@@ -9,13 +9,44 @@ Leaves: the rows with signs left out, whole functions first, since one that no r
 Does not apply: where a touchable pattern stays with no row, or with two.
 """
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 
+@dataclass(frozen=True)
+class Cubes:
+    """An exact cover of the touchable patterns.
+
+    Attributes
+    ----------
+    used : list of int
+        positions of the functions that some mode needs
+    rows : list of tuples
+        the signs of these functions, one row a mode; 0 where the sign does not matter
+    touchable : list of tuples
+        the touchable patterns of these functions
+    """
+
+    used: list
+    rows: list
+    touchable: list
+    _found: dict = field(default_factory=dict, repr=False)
+
+    def covering(self, modes):
+        """Rows that cover the same patterns as some ``modes`` (a frozenset of numbers) together, in fewer rows and signs."""
+        if modes not in self._found:
+            self._found[modes] = _merged([row for i, row in enumerate(self.rows) if i in modes], np.array(self.touchable))
+        return self._found[modes]
+
+
 def sign_cubes(signs, touchable):
-    """The rows of S with signs left out; None if they do not cover every touchable pattern exactly once."""
+    """The Cubes of a sign matrix; None if its rows do not cover every touchable pattern exactly once."""
     rows = _fewest_signs(signs, touchable)
-    return rows if (_owners(rows, touchable) == 1).all() else None
+    if (_owners(rows, touchable) != 1).any():
+        return None
+    used = np.flatnonzero(rows.any(axis=0))
+    return Cubes(used.tolist(), _tuples(rows[:, used]), _tuples(np.unique(np.array(touchable)[:, used], axis=0)))
 
 
 def not_covered_once(signs, touchable):
@@ -27,7 +58,7 @@ def not_covered_once(signs, touchable):
 def _fewest_signs(signs, touchable):
     rows = np.array(signs)
     if (_owners(rows, touchable) > 1).any():
-        return signs
+        return rows
     functions = [(slice(None), k) for k in range(rows.shape[1])]
     single = list(zip(*rows.nonzero()))
     for place in functions + single:
@@ -35,21 +66,39 @@ def _fewest_signs(signs, touchable):
         fewer[place] = 0
         if (_owners(fewer, touchable) <= 1).all():
             rows = fewer
-    return [tuple(map(int, row)) for row in rows]
+    return rows
 
 
 def _owners(rows, patterns):
     """To how many rows each pattern belongs."""
-    rows = np.array(rows)[:, None, :]
-    return ((rows == 0) | (rows == np.array(patterns))).all(axis=2).sum(axis=0)
+    return np.sum([_inside(row, np.array(patterns)) for row in rows], axis=0)
 
 
-def merged(rows):
-    """The same patterns in fewer rows: two that differ in one sign only become one without it."""
-    for a in rows:
-        for b in rows:
-            differing = [k for k, (s, r) in enumerate(zip(a, b)) if s != r]
-            if len(differing) == 1 and a[differing[0]] == -b[differing[0]]:
-                both = tuple(0 if k == differing[0] else s for k, s in enumerate(a))
-                return merged([both, *(row for row in rows if row not in (a, b))])
+def _inside(row, patterns):
+    """Which patterns belong to a row."""
+    return ((np.array(row) == 0) | (patterns == row)).all(axis=1)
+
+
+def _merged(rows, patterns):
+    """Disjoint rows joined as long as two have a row for both."""
+    for k, a in enumerate(rows):
+        for b in rows[:k]:
+            both = _inside(a, patterns) | _inside(b, patterns)
+            row = np.where((patterns[both] == patterns[both][0]).all(axis=0), patterns[both][0], 0)
+            if (_inside(row, patterns) == both).all():
+                return _merged([_shortest(row, patterns), *(r for r in rows if r not in (a, b))], patterns)
     return rows
+
+
+def _shortest(row, patterns):
+    """A row without the signs that follow from its others."""
+    inside = _inside(row, patterns)
+    for k in range(len(row)):
+        fewer = np.where(np.arange(len(row)) == k, 0, row)
+        if (_inside(fewer, patterns) == inside).all():
+            row = fewer
+    return tuple(row.tolist())
+
+
+def _tuples(array):
+    return [tuple(row) for row in array.tolist()]

@@ -18,7 +18,7 @@ from pyomo.core import Constraint, RangeSet, Var
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
-from pyomo_fesd.dcs.cubes import merged, not_covered_once
+from pyomo_fesd.dcs.cubes import not_covered_once
 from pyomo_fesd.dcs.regions import value_now
 
 NAME = 'heaviside'
@@ -38,23 +38,12 @@ def why_not(system):
 
 def size(system):
     """Number of switching functions that matter."""
-    return len(_used(system))
+    return len(system.regions.geometry.cubes.used)
 
 
 def count(system):
     """Variables, constraints and pairs of one time."""
     return 6 * size(system)
-
-
-def _used(system):
-    """Positions of the functions that some mode needs."""
-    return [k for k, column in enumerate(zip(*system.regions.geometry.cubes)) if any(column)]
-
-
-def _rows(system):
-    """The sign matrix of the functions that matter, one row a mode."""
-    used = _used(system)
-    return [tuple(row[k] for k in used) for row in system.regions.geometry.cubes]
 
 
 def declare(block, index, functions):
@@ -73,7 +62,7 @@ def declare(block, index, functions):
 
 def add(block, index, system):
     """Add one time of one Disjunction."""
-    for k, position in zip(block.functions, _used(system)):
+    for k, position in zip(block.functions, system.regions.geometry.cubes.used):
         c = system.regions.functions[position]
         alpha, p, n = (var[(*index, k)] for var in (block.alpha, block.p, block.n))
         now = value_now(c) or 0.0
@@ -85,18 +74,19 @@ def add(block, index, system):
 
 def weight(block, index, system, modes):
     """The sum of nu_i over some of the ``modes``, by number."""
-    rows = _rows(system)
+    cubes = system.regions.geometry.cubes
     alpha = [block.alpha[(*index, k)] for k in block.functions]
-    own, others = (merged([row for i, row in enumerate(rows) if (i in modes) == wanted]) for wanted in (True, False))
+    own = cubes.covering(frozenset(modes))
+    others = cubes.covering(frozenset(range(len(system.modes))) - frozenset(modes))
     if len(others) == 1 and sum(map(abs, others[0])) == 1:
-        # 1 - (1 - alpha) is alpha
+        # the other side of one function
         own = [tuple(-sign for sign in others[0])]
     return sum(prod(a if sign > 0 else 1 - a for a, sign in zip(alpha, row) if sign) for row in own)
 
 
 def owners(system):
     """The modes whose multiplier each pair holds; None where a step variable is no mode's own."""
-    rows, found = _rows(system), []
+    rows, found = system.regions.geometry.cubes.rows, []
     for k in range(len(rows[0])):
         for sign in (1, -1):
             alone = tuple(sign if j == k else 0 for j in range(len(rows[0])))

@@ -48,7 +48,7 @@ class Geometry:
 
     @cached_property
     def cubes(self):
-        """S with as many zeros as possible (``sign_cubes``), None where no sign matrix is exact at every point."""
+        """S with as many zeros as possible (``sign_cubes``), None where that is not exact at every point."""
         return sign_cubes(self.signs, self.touchable)
 
 
