@@ -66,7 +66,8 @@ def add(block, index, system):
         c = system.regions.functions[position]
         alpha, p, n = (var[(*index, k)] for var in (block.alpha, block.p, block.n))
         now = value_now(c) or 0.0
-        alpha.value, p.value, n.value = 0.5, max(now, 0.0), max(-now, 0.0)
+        # on the side of c_k as it is now, but not at the bound: with 1/2 the solver took longer, from the bound much longer
+        alpha.value, p.value, n.value = 0.5 + 0.4 * ((now > 0) - (now < 0)), max(now, 0.0), max(-now, 0.0)
         block.switching.add((*index, k), c == p - n)
         block.complementarity.add((*index, 2 * k - 1), complements(alpha >= 0, n >= 0))
         block.complementarity.add((*index, 2 * k), complements(1 - alpha >= 0, p >= 0))

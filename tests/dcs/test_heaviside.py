@@ -189,6 +189,7 @@ def test_algebraic_variables_are_blended_too():
 def test_the_step_variables_start_at_the_initial_state():
     m = dcs(thresholds(), form='heaviside')
     block, _ = form_of(m.level[0])
+    assert [block.alpha[0, k].value for k in block.functions] == [0.9, 0.9]  # x = -2: below 0 and below 1
     start = [part[0, k].value for part in (block.p, block.n) for k in block.functions]
     put_on(m.level[0], 1)
     assert start == pytest.approx([part[0, k].value for part in (block.p, block.n) for k in block.functions])

@@ -1,6 +1,5 @@
 """Nested Disjunctions become one system whose modes are the ways down (theory, section 1)."""
 
-import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 from pyomo.gdp import Disjunct, Disjunction
@@ -10,16 +9,15 @@ import pyomo_fesd
 from pyomo_fesd import FesdError
 from tests.models import (
     EVERYWHERE,
-    collocate,
     dcs,
     finite_elements,
     form_of,
     generated,
+    modes_on,
     rate,
     scalar_ode,
     snapshot,
     thresholds,
-    turn_on,
     values_of_generated,
     weights,
 )
@@ -115,9 +113,9 @@ def test_nested_modes_cost_as_much_as_the_same_modes_in_one_disjunction(inner):
 def test_a_disjunct_has_the_sum_of_the_multipliers_of_its_modes(inner, form):
     m = dcs(two_levels(inner), form=form)
     speed = inner_disjunction(m, 0)
-    slow, fast = speed.disjuncts
-    for disjunct, outer, within, dx in ((slow, [0, 1], [1, 0], 2), (fast, [0, 1], [0, 1], 1), (m.low[0], [1, 0], [0, 0], 3)):
-        turn_on(m.level[0] if disjunct is m.low[0] else speed, disjunct)
+    for x, outer, within, dx in ((-1.0, [1, 0], [0, 0], 3), (0.5, [0, 1], [1, 0], 2), (1.5, [0, 1], [0, 1], 1)):
+        m.x[0].value = x
+        modes_on(m.level[0])
         assert [pyo.value(w) for w in weights(m.level[0]).values()] == outer
         assert [pyo.value(w) for w in weights(speed).values()] == within
         assert rate(m.level[0], m.dx[0]) == pytest.approx(dx)
@@ -172,9 +170,9 @@ def test_what_an_outer_mode_states_itself_holds_in_all_its_inner_modes():
         m.low[t].other = pyo.Constraint(expr=m.dy[t] == 5)
         m.high[t].other = pyo.Constraint(expr=m.dy[t] == -m.x[t])
     dcs(m, form='heaviside')
-    m.x[0].value = 0.5
-    for disjunct, dy in ((m.low[0], 5), (m.high[0].slow, -0.5), (m.high[0].fast, -0.5)):
-        turn_on(m.level[0] if disjunct is m.low[0] else m.high[0].speed, disjunct)
+    for x, dy in ((-1.0, 5), (0.5, -0.5), (1.5, -1.5)):
+        m.x[0].value = x
+        modes_on(m.level[0])
         assert rate(m.level[0], m.dy[0]) == pytest.approx(dy)
     equation = next(str(c.expr) for c in generated(m, pyo.Constraint).values() if 'dy[0]' in str(c.expr))
     assert equation.count('alpha') == 2  # the outer step alone: alpha*5 + (1 - alpha)*(- x)
@@ -217,10 +215,10 @@ def deep(depth):
 def test_disjunctions_may_be_nested_to_any_depth():
     m = dcs(deep(4), form='stewart')
     assert len(generated(m, Complementarity)) == 5 * len(m.t)
-    innermost = m.beyond[0].beyond.beyond.beyond
-    turn_on(m.beyond[0].beyond.beyond.split, innermost)
-    assert rate(m.split[0], m.dx[0]) == pytest.approx(5)
-    assert pyo.value(weights(m.split[0])[m.beyond[0]]) == 1
+    for k, x in enumerate((-0.5, 0.5, 1.5, 2.5, 3.5), start=1):
+        m.x[0].value = x
+        assert modes_on(m.split[0]) == [m.here[0] if k == 1 else m.beyond[0]]
+        assert rate(m.split[0], m.dx[0]) == pytest.approx(k)
 
 
 def two_inside(m, t, d):
@@ -251,20 +249,13 @@ def several_inside():
 @pytest.mark.parametrize('form', FORMS)
 def test_a_disjunct_with_two_disjunctions_has_a_mode_for_each_combination(form):
     m = dcs(several_inside(), form=form)
-    first, second = m.on[0].first, m.on[0].second
-    block, _ = form_of(m.power[0])
-    seen = set()
-    for number in range(1, 9 if block.component('alpha') is not None else 1 + len(block.nu) // 2):
-        from tests.models import put_on
-
-        put_on(m.power[0], number)
-        if pyo.value(weights(m.power[0])[m.on[0]]) != 1:
-            continue
-        F, G = ([round(pyo.value(w)) for w in weights(d).values()] for d in (first, second))
-        assert rate(m.power[0], m.F[0]) == pytest.approx(F[0] + 2 * F[1])
-        assert rate(m.power[0], m.G[0]) == pytest.approx(10 * G[0] + 20 * G[1])
-        seen.add((*F, *G))
-    assert seen == {(1, 0, 1, 0), (1, 0, 0, 1), (0, 1, 1, 0), (0, 1, 0, 1)}
+    for x, F in ((0.5, 1), (1.5, 2)):
+        for y, G in ((-1.0, 10), (1.0, 20)):
+            m.x[0].value, m.y[0].value = x, y
+            assert modes_on(m.power[0]) == [m.on[0]]
+            assert [rate(m.power[0], v) for v in (m.F[0], m.G[0])] == pytest.approx([F, G])
+            first, second = ([pyo.value(w) for w in weights(d).values()] for d in (m.on[0].first, m.on[0].second))
+            assert (first, second) == ([F == 1, F == 2], [G == 10, G == 20])
 
 
 def test_independent_inner_disjunctions_need_no_products_of_their_steps():
@@ -272,3 +263,221 @@ def test_independent_inner_disjunctions_need_no_products_of_their_steps():
     F, G = (str(m._pyomo_fesd_dcs.power_heaviside_3.mode[0, j].expr) for j in (1, 2))
     assert ('alpha[0,2]' in F, 'alpha[0,3]' in F) == (True, False)
     assert ('alpha[0,2]' in G, 'alpha[0,3]' in G) == (False, True)
+
+
+# Modes that are switched off
+
+
+@pytest.mark.parametrize(
+    'switch', [lambda d: d.deactivate(), lambda d: d.indicator_var.fix(False)], ids=['deactivated', 'fixed to False']
+)
+def test_an_inner_mode_that_is_switched_off_leaves_nothing(switch):
+    m = two_levels(declared_inside)
+    for t in m.t:
+        m.high[t].slow.region.deactivate()  # what is left divides the line
+        switch(m.high[t].fast)
+    dcs(m)
+    assert list(m._pyomo_fesd_dcs.component_map()) == ['level']
+    assert len(generated(m, Complementarity)) == 2 * len(m.t)
+    assert set(weights(m.high[0].speed)) == {m.high[0].slow}
+
+
+def test_an_inner_mode_that_is_fixed_to_true_has_its_outer_mode_on():
+    m = two_levels(declared_inside)
+    for t in m.t:
+        m.high[t].slow.indicator_var.fix(True)
+    dcs(m)
+    assert generated(m, Complementarity) == {}
+    found = {str(c.expr) for c in generated(m, pyo.Constraint).values()}
+    assert found == {text for t in m.t for text in (f'0  <=  x[{t}]', f'x[{t}]  <=  1', f'dx[{t}]  ==  2')}
+
+
+@writings
+def test_an_outer_mode_that_is_switched_off_takes_its_inner_ones_with_it(inner):
+    m = two_levels(inner)
+    m.high.deactivate()
+    dcs(m)
+    assert generated(m, Complementarity) == {}
+    assert not list(m.component_data_objects(Disjunction, active=True, descend_into=EVERYWHERE))
+    assert len(generated(m, pyo.Constraint)) == 2 * len(m.t)
+
+
+def test_a_nested_disjunction_that_is_switched_off_asks_for_its_disjuncts_to_be_so_too():
+    m = two_levels(declared_inside)
+    for t in m.t:
+        m.high[t].speed.deactivate()
+    with pytest.raises(FesdError, match=r"'high\[0\].slow', which belongs to no active Disjunction"):
+        dcs(m)
+    for t in m.t:
+        m.high[t].slow.deactivate()
+        m.high[t].fast.deactivate()
+        m.high[t].ode = pyo.Constraint(expr=m.dx[t] == 2)
+    dcs(m)
+    assert list(m._pyomo_fesd_dcs.component_map()) == ['level']
+
+
+# The whole path
+
+
+@writings
+@pytest.mark.parametrize('form', ['heaviside', 'stewart'])
+def test_switches_are_found_in_outer_and_inner_disjunctions(inner, form):
+    # from -2 at rate 3, then 2, then 1: at 0 after 2/3, at 1 after 1/2 more, at 11/6 after 2
+    m = two_levels(inner)
+    m.rest = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == 0)
+    m.y[0].fix(1)
+    solve(move(dcs(m, form=form), 8, 2))
+    name, slow, fast = INNER[inner]
+    found = pyomo_fesd.switches(m)
+    assert [(s.disjunction, s.before, s.after) for s in found] == [('level', 'low', 'high'), (name, slow, fast)]
+    assert [s.time for s in found] == pytest.approx([2 / 3, 7 / 6], abs=1e-9)
+    assert m.x[2].value == pytest.approx(11 / 6, abs=1e-9)
+    assert [m.low[2].indicator_var.value, m.high[2].indicator_var.value] == [False, True]
+    assert [d.indicator_var.value for d in inner_disjunction(m, 2).disjuncts] == [False, True]
+    frame = pyomo_fesd.trajectory(m)
+    outer, within = (frame[[f'{d}: {mode}' for mode in modes]] for d, modes in (('level', ['high']), (name, [slow, fast])))
+    assert outer.sum(axis=1).tolist() == pytest.approx(within.sum(axis=1).tolist())
+
+
+@pytest.mark.parametrize('scheme', SCHEMES)
+def test_a_slide_between_an_outer_mode_and_an_inner_one(scheme):
+    """x slides at 0 between 'low' (rate 1) and the inner mode 'down' of 'high' (rate -3); at y = 0 'up' takes over (rate 1)."""
+    m = scalar_ode(x0=1.0)
+    m.fall = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == -1)
+    m.y[0].fix(1)
+
+    @m.Disjunct(m.t)
+    def low(d, t):
+        d.region = pyo.Constraint(expr=m.x[t] <= 0)
+        d.ode = pyo.Constraint(expr=m.dx[t] == 1)
+
+    @m.Disjunct(m.t)
+    def high(d, t):
+        d.region = pyo.Constraint(expr=m.x[t] >= 0)
+        d.down, d.up = Disjunct(), Disjunct()
+        d.down.region = pyo.Constraint(expr=m.y[t] >= 0)
+        d.down.ode = pyo.Constraint(expr=m.dx[t] == -3)
+        d.up.region = pyo.Constraint(expr=m.y[t] <= 0)
+        d.up.ode = pyo.Constraint(expr=m.dx[t] == 1)
+        d.way = Disjunction(expr=[d.down, d.up])
+
+    m.level = Disjunction(m.t, rule=lambda m, t: [m.low[t], m.high[t]])
+    solve(move(dcs(m), 9, 2, scheme=scheme))
+    frame, found = pyomo_fesd.trajectory(m), pyomo_fesd.switches(m)
+    assert [(s.disjunction, s.before, s.after) for s in found] == [
+        ('level', 'high', 'sliding low | high'),
+        ('level', 'sliding low | high', 'high'),
+        ('high.way', 'down', 'up'),
+    ]
+    assert [s.time for s in found] == pytest.approx([1 / 3, 1, 1], abs=1e-8)
+    sliding = frame[(frame.index > 0.4) & (frame.index < 0.9)]
+    assert sliding['high.way: down'].tolist() == pytest.approx([0.25] * len(sliding))
+    assert m.x[2].value == pytest.approx(1, abs=1e-8)
+
+
+def test_the_report_counts_inner_disjunctions_and_modes_that_are_left_out():
+    m = two_levels(declared_inside)
+    for t in m.t:
+        m.high[t].slow.region.deactivate()
+        m.high[t].fast.deactivate()
+    dcs(m)
+    size = pyomo_fesd.report(m)
+    assert [size[name] for name in ('disjunctions', 'modes left out', 'pairs')] == [4, 2, 4]
+
+
+# What is refused
+
+
+def at_another_time(m):
+    m.inner = Disjunction(expr=[[m.y[0] <= 0, m.dy[0] == 1], [m.y[0] >= 0, m.dy[0] == 2]])
+    m.later = Disjunction(m.t, rule=lambda m, t: [m.high[2 - t].slow, m.high[2 - t].fast])
+
+
+def in_two_places(m):
+    m.other = Disjunct(m.t, rule=lambda d, t: None)
+    m.speed = Disjunction(m.t, rule=lambda m, t: [m.high[t].slow, m.other[t]])
+
+
+def without_condition(m):
+    for t in m.t:
+        m.high[t].slow.region.deactivate()
+        m.high[t].region.deactivate()
+
+
+def overlapping(m):
+    for t in m.t:
+        m.high[t].fast.region.deactivate()
+
+
+def inclusive(m):
+    for t in m.t:
+        m.high[t].speed.xor = False
+
+
+def all_off(m):
+    for t in m.t:
+        m.high[t].slow.deactivate()
+        m.high[t].fast.deactivate()
+
+
+def lonely(m):
+    for t in m.t:
+        m.high[t].third = Disjunct()
+
+
+def both_on(m):
+    for t in m.t:
+        m.low[t].indicator_var.fix(True)
+        m.high[t].fast.indicator_var.fix(True)
+
+
+def missing_equation(m):
+    for t in m.t:
+        m.high[t].slow.ode.deactivate()
+
+
+BAD = {
+    'at another time': (without_disjunction, at_another_time, 'later[', 'of another time'),
+    'in two places': (without_disjunction, in_two_places, 'speed[0]', 'different disjuncts'),
+    'no condition on the whole way': (declared_inside, without_condition, 'high[0].slow', 'no region condition'),
+    'inner regions that overlap': (declared_inside, overlapping, 'level[0]', 'overlap'),
+    'an inner xor=False': (declared_inside, inclusive, 'high[0].speed', 'xor=False'),
+    'all inner modes off': (declared_inside, all_off, 'high[0].speed', 'switched off'),
+    'an inner disjunct in no Disjunction': (declared_inside, lonely, 'high[0]', 'no active Disjunction'),
+    'an inner and another outer mode fixed to True': (declared_inside, both_on, 'level[0]', "'low.0.', 'high.0..fast'"),
+    'an inner mode that defines nothing': (declared_inside, missing_equation, 'high[0].slow', '0 equation'),
+}
+
+
+@pytest.mark.parametrize('fault', BAD)
+def test_a_fault_is_refused_by_name_and_the_model_stays_as_it_was(fault):
+    inner, spoil, component, cause = BAD[fault]
+    m = two_levels(inner)
+    if inner is without_disjunction:
+        m.del_component(m.speed)
+    spoil(m)
+    before = snapshot(m)
+    with pytest.raises(FesdError, match=cause) as refusal:
+        dcs(m)
+    assert refusal.value.component.startswith(component) and refusal.value.fix
+    assert snapshot(m) == before
+
+
+@pytest.mark.parametrize('inner', [declared_inside, without_disjunction])
+def test_a_nested_disjunction_is_no_target(inner):
+    m = two_levels(inner)
+    before = snapshot(m)
+    with pytest.raises(FesdError, match=r"nested in 'high\[0\]'") as refusal:
+        dcs(m, targets=inner_disjunction(m, 0))
+    assert 'outermost' in refusal.value.fix
+    assert snapshot(m) == before
+    dcs(m, targets=m.level)
+    assert not inner_disjunction(m, 0).active
+
+
+def test_disjunctions_in_a_design_choice_are_left_alone():
+    m = two_levels(declared_inside)
+    m.buy = Disjunct()
+    m.buy.sgn = Disjunction(m.t, rule=lambda d, t: [[m.y[t] <= 0, m.dy[t] == 1], [m.y[t] >= 0, m.dy[t] == 2]])
+    dcs(m)
+    assert all(d.active for d in m.buy.sgn.values())
