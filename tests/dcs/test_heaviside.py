@@ -26,14 +26,13 @@ from tests.models import (
     rates_of,
     scalar_ode,
     signum,
-    snapshot,
     tank,
     thresholds,
     turn_on,
     violation,
     weights,
 )
-from tests.problems.running import LEGENDRE, RADAU, move, solve
+from tests.problems.running import LEGENDRE, RADAU, move, seen, solve
 
 
 def three_sectors():
@@ -88,11 +87,11 @@ def test_a_form_counts_what_it_writes(build, form):
 
 def test_where_the_weights_would_not_sum_up_to_one_the_form_is_refused_by_name():
     m = three_sectors()
-    before = snapshot(m)
+    before = seen(m)
     with pytest.raises(FesdError, match="form='heaviside' does not fit: where .* the signs of 0 modes fit") as refusal:
         dcs(m, form='heaviside')
     assert refusal.value.component == 'sgn[0]' and "form='auto'" in refusal.value.fix
-    assert snapshot(m) == before
+    assert seen(m) == before
 
 
 def test_a_sector_that_can_take_in_what_is_touched_at_the_corner_does():

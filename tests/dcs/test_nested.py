@@ -16,12 +16,11 @@ from tests.models import (
     modes_on,
     rate,
     scalar_ode,
-    snapshot,
     thresholds,
     values_of_generated,
     weights,
 )
-from tests.problems.running import SCHEMES, move, solve
+from tests.problems.running import SCHEMES, move, seen, solve
 
 fesd_dcs = pyo.TransformationFactory('fesd.dcs')
 FORMS = ['auto', 'stewart', 'heaviside']
@@ -137,20 +136,20 @@ def test_before_and_after_discretisation_give_the_same_equations(inner):
 @writings
 def test_create_using_and_clones_leave_the_original_as_it_was(inner):
     m = two_levels(inner)
-    before = snapshot(m)
+    before = seen(m)
     new = fesd_dcs.create_using(m)
-    assert snapshot(m) == before
+    assert seen(m) == before
     copy = finite_elements(new.clone(), nfe=2, ncp=2)
-    assert snapshot(m) == before
+    assert seen(m) == before
     assert len(generated(copy, Complementarity)) == 4 * len(copy.t)
     assert set(weights(copy.level[0])) == {copy.low[0], copy.high[0]}
 
 
 def test_a_second_time_changes_nothing():
     m = dcs(two_levels(declared_inside))
-    before = snapshot(m)
+    before = seen(m)
     dcs(m)
-    assert snapshot(m) == before
+    assert seen(m) == before
 
 
 def test_generated_components_lead_back_to_inner_and_outer_disjuncts():
@@ -456,21 +455,21 @@ def test_a_fault_is_refused_by_name_and_the_model_stays_as_it_was(fault):
     if inner is without_disjunction:
         m.del_component(m.speed)
     spoil(m)
-    before = snapshot(m)
+    before = seen(m)
     with pytest.raises(FesdError, match=cause) as refusal:
         dcs(m)
     assert refusal.value.component.startswith(component) and refusal.value.fix
-    assert snapshot(m) == before
+    assert seen(m) == before
 
 
 @pytest.mark.parametrize('inner', [declared_inside, without_disjunction])
 def test_a_nested_disjunction_is_no_target(inner):
     m = two_levels(inner)
-    before = snapshot(m)
+    before = seen(m)
     with pytest.raises(FesdError, match=r"nested in 'high\[0\]'") as refusal:
         dcs(m, targets=inner_disjunction(m, 0))
     assert 'outermost' in refusal.value.fix
-    assert snapshot(m) == before
+    assert seen(m) == before
     dcs(m, targets=m.level)
     assert not inner_disjunction(m, 0).active
 
