@@ -210,6 +210,9 @@ def _expand(component, home):
     """Give a Disjunction or LogicalConstraint its missing indices by its own rule."""
     for index in component.index_set():
         if index not in component._data:
-            stated = apply_indexed_rule(component, _rule(component), home, index)
+            if component.ctype is Disjunction:
+                stated = apply_indexed_rule(component, component._init_rule, home, index)
+            else:
+                stated = component.rule(home, index)
             if stated is not component.Skip:
                 component[index] = stated

@@ -381,6 +381,8 @@ def gated(logic=True, discretised=False):
     m.dx, m.dclock = dae.DerivativeVar(m.x), dae.DerivativeVar(m.clock)
     m.x[0].fix(0), m.x[3].fix(1.5), m.clock[0].fix(0)
     m.tick = pyo.Constraint(m.t, rule=lambda m, t: m.dclock[t] == 1)
+    m.effort = dae.Integral(m.t, rule=lambda m, t: m.u[t] ** 2)
+    m.cost = pyo.Objective(expr=m.effort)
     if discretised:
         collocate(m, nfe=9)
 
@@ -400,9 +402,6 @@ def gated(logic=True, discretised=False):
     m.door = Disjunction(m.t, rule=lambda m, t: [m.closed[t, 0], m.closed[t, 1]])
     if logic:
         m.logic = pyo.LogicalConstraint(m.t, rule=lambda m, t: on(m.closed[t, 1]).implies(on(m.level[t, 2])))
-    if not discretised:
-        m.effort = dae.Integral(m.t, rule=lambda m, t: m.u[t] ** 2)
-        m.cost = pyo.Objective(expr=m.effort)
     return m
 
 
@@ -419,6 +418,11 @@ def test_an_excluded_combination_costs_what_it_must(scheme, form, logic, cost, s
     m = certified(move(dcs(gated(logic), form=form), 9, 2, scheme=scheme))
     assert pyo.value(m.cost) == pytest.approx(cost, abs=1e-9)
     assert [s.time for s in pyomo_fesd.switches(m)] == pytest.approx(switches, abs=1e-6)
+
+
+def test_on_a_grid_that_is_there_already_it_costs_the_same():
+    m = certified(move(dcs(gated(discretised=True))))
+    assert pyo.value(m.cost) == pytest.approx(33 / 32, abs=1e-9)
 
 
 def test_a_mode_that_logic_has_trimmed_does_not_come_up():
