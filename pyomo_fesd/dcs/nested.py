@@ -79,29 +79,49 @@ class Nesting:
         self._times = times
         self._inside = ComponentMap()
         for disjunction in model.component_data_objects(Disjunction, active=True, descend_into=(Block, Disjunct)):
-            host = self.host(disjunction)
+            host = self._host(disjunction)
             if host is not None:
                 self._inside.setdefault(host, []).append(disjunction)
 
-    def refuse_nested(self, disjunction):
-        """A Disjunction that is named as a target must be outermost."""
-        host = self.host(disjunction)
+    def _host(self, disjunction):
+        """The disjunct over time that a Disjunction over time lies in, by its own place or by that of its disjuncts, or None."""
+        if self._times.time(disjunction) is None:
+            return None
+        host = self._enclosing(disjunction)
         if host is not None:
+            return host
+        hosts = ComponentSet(self._enclosing(d) for d in disjunction.disjuncts)
+        if len(hosts) > 1:
             raise FesdError(
                 disjunction,
-                f"fesd.dcs: this Disjunction is nested in '{host.name}'",
-                "give the outermost Disjunction as target; what is inside goes with it",
+                "its disjuncts lie in different disjuncts, or only some of them in one",
+                "declare all disjuncts of a nested Disjunction in the disjunct that it belongs to",
             )
+        return next(iter(hosts), None)
 
-    @staticmethod
-    def host(disjunction):
-        """The disjunct that ``disjunction`` lies in, by its own place or by that of its disjuncts; None if it is outermost."""
-        hosts = ComponentSet([_enclosing(disjunction)])
-        if None in hosts:
-            hosts = ComponentSet(_enclosing(d) for d in disjunction.disjuncts)
-        if len(hosts) == 1:
-            return next(iter(hosts))
-        return _refuse_several_hosts(disjunction)
+    def _enclosing(self, component):
+        """The innermost disjunct over time around a component, or None."""
+        block = component.parent_block()
+        while block is not None and block.ctype is not Disjunct:
+            block = block.parent_block()
+        return block if block is not None and self._times.time(block) is not None else None
+
+    def outermost(self, disjunctions, targets):
+        """Those of ``disjunctions`` that are over time and not nested; one that is named as a target must not be nested."""
+        named = [t for t in targets if t.ctype is Disjunction]
+        named = ComponentSet(chain(*(t.values() if hasattr(t, 'values') else [t] for t in named)))
+        found = []
+        for disjunction in disjunctions:
+            host = self._host(disjunction)
+            if host is None and self._times.time(disjunction) is not None:
+                found.append(disjunction)
+            elif host is not None and disjunction in named:
+                raise FesdError(
+                    disjunction,
+                    f"fesd.dcs: this Disjunction is nested in '{host.name}'",
+                    "give the outermost Disjunction as target; what is inside goes with it",
+                )
+        return found
 
     def tree(self, disjunction):
         """The tree of an outermost Disjunction."""
@@ -127,14 +147,6 @@ class Nesting:
             for ways in product(*(self._modes(inner) for inner in self._inside.get(disjunct, ()))):
                 below, ends = (tuple(chain(*(getattr(way, part) for way in ways))) for part in ('disjuncts', 'innermost'))
                 yield Mode((disjunct, *below), ends or (disjunct,))
-
-
-def _enclosing(component):
-    """The innermost disjunct around a component, None if there is none."""
-    block = component.parent_block()
-    while block is not None and block.ctype is not Disjunct:
-        block = block.parent_block()
-    return block
 
 
 def _possible(disjunction, disjunct):
@@ -169,11 +181,3 @@ def _refuse_inclusive_or(disjunction):
             "it is declared with xor=False: several modes may be active at once",
             "a switching system is in one mode at a time: leave xor at True",
         )
-
-
-def _refuse_several_hosts(disjunction):
-    raise FesdError(
-        disjunction,
-        "its disjuncts lie in different disjuncts, or only some of them in one",
-        "declare all disjuncts of a nested Disjunction in the disjunct that it belongs to",
-    )

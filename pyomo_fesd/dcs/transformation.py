@@ -70,7 +70,7 @@ class DynamicComplementaritySystem(Transformation):
         wrt = find_continuous_set(instance, config.wrt, 'fesd.dcs')
         times = TimeIndex(wrt)
         nesting = Nesting(instance.model(), times)
-        found = [d for d in _disjunctions(instance, config.targets, nesting) if times.time(d) is not None]
+        found = nesting.outermost(_disjunctions(instance, config.targets), config.targets or ())
         reader = Reader(derivatives(instance.model(), wrt), times)
         defined = instance.model().private_data('pyomo_fesd.dcs').defined
         with PauseGC():
@@ -157,20 +157,16 @@ def _blocks(instance, targets):
             yield from target.values() if not isinstance(target, BlockData) else [target]
 
 
-def _disjunctions(instance, targets, nesting):
-    """Active DisjunctionData of the targets that are not nested, in declaration order."""
+def _disjunctions(instance, targets):
+    """Active DisjunctionData of the targets, in declaration order."""
     for target in targets or [instance]:
         if target.model() is not instance.model():
             raise FesdError(target, "fesd.dcs: this target belongs to another model", "give a component of the model itself")
         if target.ctype is Disjunction:
-            for disjunction in target.values() if hasattr(target, 'values') else [target]:
-                if disjunction.active:
-                    nesting.refuse_nested(disjunction)
-                    yield disjunction
+            yield from (d for d in (target.values() if hasattr(target, 'values') else [target]) if d.active)
         elif target.ctype is Block:
             for block in _blocks(instance, [target]):
-                below = block.component_data_objects(Disjunction, active=True, descend_into=Block)
-                yield from (d for d in below if nesting.host(d) is None)
+                yield from block.component_data_objects(Disjunction, active=True, descend_into=Block)
         else:
             raise FesdError(
                 target,

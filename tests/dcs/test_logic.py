@@ -425,6 +425,45 @@ def test_on_a_grid_that_is_there_already_it_costs_the_same():
     assert pyo.value(m.cost) == pytest.approx(33 / 32, abs=1e-9)
 
 
+def corridor(logic):
+    """Move x from 1/2 to 5/2 in three units of time with least effort; from 1 on a door is closed, from 2 on the way is low.
+
+    Free: u = 2/3, effort 4/3.  While the door is closed 'upper' is excluded, so x = 1 not before 2: u = 1/4 until then
+    (effort 1/8), 3/2 afterwards (9/4).
+    """
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 3))
+    m.x, m.u = pyo.Var(m.t, initialize=lambda m, t: 0.5 + 2 * t / 3), pyo.Var(m.t, initialize=0.5)
+    m.clock, m.place = pyo.Var(m.t, initialize=lambda m, t: t), pyo.Var(m.t, initialize=0)
+    m.gate = pyo.Var(m.t, initialize=0)
+    m.dx, m.dclock = dae.DerivativeVar(m.x), dae.DerivativeVar(m.clock)
+    m.x[0].fix(0.5), m.x[3].fix(2.5), m.clock[0].fix(0)
+    m.tick = pyo.Constraint(m.t, rule=lambda m, t: m.dclock[t] == 1)
+    m.ode = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == m.u[t])
+    m.effort = dae.Integral(m.t, rule=lambda m, t: m.u[t] ** 2)
+    m.cost = pyo.Objective(expr=m.effort)
+    add_modes(
+        m,
+        lambda m, t: [m.x[t] <= 1, m.place[t] == 0],
+        lambda m, t: [m.x[t] >= 1, m.clock[t] <= 2, m.place[t] == 1],
+        lambda m, t: [m.x[t] >= 1, m.clock[t] >= 2, m.place[t] == 2],
+        name='where',
+    )
+    add_modes(m, lambda m, t: [m.clock[t] <= 1, m.gate[t] == 0], lambda m, t: [m.clock[t] >= 1, m.gate[t] == 1], name='door')
+    if logic:
+        m.logic = pyo.LogicalConstraint(
+            m.t, rule=lambda m, t: pyo.lnot(on(m.where[t].disjuncts[1]).land(on(m.door[t].disjuncts[1])))
+        )
+    return m
+
+
+@pytest.mark.parametrize('form', ['stewart', 'heaviside'])
+@pytest.mark.parametrize('logic, cost', [(False, 4 / 3), (True, 19 / 8)])
+def test_a_mode_whose_weight_is_a_product_can_be_excluded(form, logic, cost):
+    m = certified(move(dcs(corridor(logic), form=form), 9, 2))
+    assert pyo.value(m.cost) == pytest.approx(cost, abs=1e-8)
+
+
 def test_a_mode_that_logic_has_trimmed_does_not_come_up():
     # below zero the rate is 3, the mode above is excluded: x must stay below, which it does from -9
     m = scalar_ode(x0=-9.0)

@@ -474,9 +474,20 @@ def test_a_nested_disjunction_is_no_target(inner):
     assert not inner_disjunction(m, 0).active
 
 
-def test_disjunctions_in_a_design_choice_are_left_alone():
+def design_choice():
+    """A Disjunction over time in a disjunct that is bought or not, once for all times."""
     m = two_levels(declared_inside)
     m.buy = Disjunct()
     m.buy.sgn = Disjunction(m.t, rule=lambda d, t: [[m.y[t] <= 0, m.dy[t] == 1], [m.y[t] >= 0, m.dy[t] == 2]])
-    dcs(m)
-    assert all(d.active for d in m.buy.sgn.values())
+    return m
+
+
+def test_disjunctions_in_a_design_choice_are_left_alone():
+    m = dcs(design_choice())
+    assert all(d.active for d in m.buy.sgn.values()) and not m.level[0].active
+
+
+def test_a_disjunction_in_a_design_choice_is_no_nested_one():
+    m = design_choice()
+    dcs(m, targets=m.buy.sgn)
+    assert not any(d.active for d in m.buy.sgn.values()) and m.level[0].active
