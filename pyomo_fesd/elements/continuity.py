@@ -86,7 +86,9 @@ def read_continuity(model, times, held, told, trace):
 def _closure(start, rules, held, equations):
     """``start`` and all that follows from it; nothing that contains a held control does."""
     known = ComponentSet(start)
-    known.update(v for v, rule in rules.items() if rule.ctype is Constraint and not _mentions(rule, held))
+    for v, rule in rules.items():
+        if rule.ctype is Constraint:
+            known.update(_without(v, rule, held))
     if equations is None:
         return known
     kinks = [(v, rule) for v, rule in rules.items() if rule.ctype is Complementarity and equations.here(v)]
@@ -98,10 +100,14 @@ def _closure(start, rules, held, equations):
         known.update(ready)
 
 
-def _mentions(rule, components):
-    """Whether a Constraint over time contains variables of ``components``."""
-    data = next(iter(rule.values()), None) if components else None
-    return data is not None and any(v.parent_component() in components for v in identify_variables(data.body))
+def _without(v, rule, components):
+    """A marked Var, or those data of it whose own equations contain none of ``components``."""
+    if not components:
+        return [v]
+    jumping = {
+        index for index, data in rule.items() if any(u.parent_component() in components for u in identify_variables(data.body))
+    }
+    return [v[index] for index in v if index in rule and index not in jumping] if jumping else [v]
 
 
 class _Equations:
