@@ -226,7 +226,8 @@ def replace_logic(home, proposition, exclusions, weights):
         block = _block(home, constraint.parent_component())
         block.numbers.add(number)
         G, H = (weights[tree](modes) for tree, modes in exclusion.sides)
-        block.exclusion.add((*index, number), complements(G >= 0, H >= 0))
+        pair = block.exclusion.add((*index, number), complements(G >= 0, H >= 0))
+        block.private_data('pyomo_fesd.dcs').sources[pair] = [constraint]
     marks.mark(home, marks.REPLACED, constraint)
     constraint.deactivate()
 

@@ -111,7 +111,10 @@ class DynamicComplementaritySystem(Transformation):
         return _maps(component).disjunct[component]
 
     def get_src_constraint(self, component):
-        """The constraints of the disjuncts that a generated constraint blends (a list, one or more for each mode)."""
+        """The constraints of the disjuncts that a generated constraint blends (a list, one or more for each mode).
+
+        Of a pair that excludes modes, the LogicalConstraint that says so.
+        """
         return _maps(component).sources[component]
 
     def get_transformed_constraints(self, constraint):

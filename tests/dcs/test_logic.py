@@ -329,6 +329,13 @@ def test_before_and_after_discretisation_give_the_same_pairs():
         assert exclusions(before, t) == exclusions(after, t) and len(exclusions(after, t)) == 1
 
 
+def test_a_pair_leads_back_to_its_logic_also_in_a_clone():
+    m = dcs(implication()).clone()
+    pair = m._pyomo_fesd_dcs.logic.exclusion[0, 1]
+    (source,) = pyo.TransformationFactory('fesd.dcs').get_src_constraint(pair)
+    assert source is m.logic[0]
+
+
 def test_a_second_time_changes_nothing():
     m = dcs(implication())
     before = seen(m)
