@@ -338,6 +338,27 @@ def test_switches_are_found_in_outer_and_inner_disjunctions(inner, form):
     assert outer.sum(axis=1).tolist() == pytest.approx(within.sum(axis=1).tolist())
 
 
+def test_nested_modes_may_stand_in_blocks_over_time_and_have_indices():
+    m = scalar_ode()
+    m.rest = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == 0)
+    m.y[0].fix(1)
+
+    @m.Block(m.t)
+    def plant(b, t):
+        m = b.model()
+        b.low, b.high = Disjunct(), Disjunct()
+        b.low.region = pyo.Constraint(expr=m.x[t] <= 0)
+        b.low.ode = pyo.Constraint(expr=m.dx[t] == 3)
+        b.high.region = pyo.Constraint(expr=m.x[t] >= 0)
+        b.high.speed = Disjunction(['a'], rule=lambda d, i: [[m.x[t] <= 1, m.dx[t] == 2], [m.x[t] >= 1, m.dx[t] == 1]])
+        b.level = Disjunction(expr=[b.low, b.high])
+
+    solve(move(dcs(m), 8, 2))
+    found = pyomo_fesd.switches(m)
+    assert [s.disjunction for s in found] == ['plant.level', 'plant.high.speed[a]']
+    assert [s.time for s in found] == pytest.approx([2 / 3, 7 / 6], abs=1e-9)
+
+
 @pytest.mark.parametrize('scheme', SCHEMES)
 def test_a_slide_between_an_outer_mode_and_an_inner_one(scheme):
     """x slides at 0 between 'low' (rate 1) and the inner mode 'down' of 'high' (rate -3); at y = 0 'up' takes over (rate 1)."""
