@@ -11,6 +11,8 @@ CONTINUOUS         Var                       the Constraint (of lam, mu, p, n), 
                                              the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
+REPLACED           Disjunct,                 ``True``: switched off by logic between modes and not by the user, so new times of
+                   LogicalConstraint (data)  it are not switched off too
 SIDES              Var                       (name, {side: expression}) of the surface that it belongs to: positive where the
                                              quantity is on this side
 MEMORY             Expression (data)         the conditions c >= 0 of a mode with memory; the Expression is its weight, 1 or 0 in an
@@ -35,6 +37,7 @@ MEMORY = 'fesd_memory'
 GUARD = 'fesd_guard'
 RESET = 'fesd_reset'
 SIDES = 'fesd_sides'
+REPLACED = 'fesd_replaced'
 DECIDED = 'fesd_decided'
 MOVE = 'fesd_move'
 ARTIFICIAL = 'fesd_artificial'

@@ -4,7 +4,7 @@ import pandas as pd
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint, Objective
 from pyomo.core.expr.visitor import identify_variables
-from pyomo.gdp import Disjunction
+from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
@@ -42,7 +42,7 @@ def report(model):
     expressions = [c.body for c in constraints] + [o.expr for o in objectives] + [s for c in conditions for s in c._args]
     variables = ComponentSet(v for e in expressions for v in identify_variables(e, include_fixed=False))
     own = (c for c in model.component_data_objects(Complementarity, descend_into=Block) if not c.active and c not in deciding)
-    disjunctions = [d for d in model.component_data_objects(Disjunction, descend_into=Block) if _transformed(d)]
+    disjunctions = [d for d in model.component_data_objects(Disjunction, descend_into=(Block, Disjunct)) if _transformed(d)]
     return Report(
         {
             # a condition between two bounds becomes two pairs, with the two parts of its function

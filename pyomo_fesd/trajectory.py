@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Expression, Var, value
-from pyomo.gdp import Disjunction
+from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import marks
 from pyomo_fesd.conditions import conditions, positions, positive
@@ -168,7 +168,7 @@ def _multipliers(model, index):
     """``{disjunction: {mode: {label: expression}}}`` of every Disjunction over time that ``fesd.dcs`` transformed."""
     weights = ComponentMap(marks.marked(model, marks.INDICATOR))
     found = {}
-    for name, family in index.families(model.component_data_objects(Disjunction, descend_into=Block)).items():
+    for name, family in index.families(model.component_data_objects(Disjunction, descend_into=(Block, Disjunct))).items():
         modes = {}
         for t, disjunction in family.items():
             for i, disjunct in enumerate(disjunction.disjuncts, start=1):

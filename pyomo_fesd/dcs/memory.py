@@ -8,18 +8,18 @@ The regions of the modes overlap; in the overlap the last mode decides.  Two mod
 hysteresis; a mode without a condition never ends, such as that of a disc that has burst.
 
 Takes: a ``MemorySystem``.
-Leaves: ``nu`` (two modes: one, as in eq. 5), ``weight`` of every mode and ``condition`` as Expressions, ``simplex`` for more
-than two modes, ``mode`` (eq. 7), and the mark MEMORY, from which ``fesd.finite_elements`` makes the law of switching between its
-elements (``elements/memory.py``).
+Leaves: ``nu`` (of all modes but the last), ``weight`` of every mode and ``condition`` as Expressions, ``mode`` (eq. 7), and the
+mark MEMORY, from which ``fesd.finite_elements`` makes the law of switching between its elements (``elements/memory.py``).
 Does not apply: to a model on a fixed grid, where no element boundary can lie on the end of a region.
 """
 
 from dataclasses import dataclass
 
-from pyomo.core import Constraint, Expression, Set, Var
+from pyomo.core import Expression, Set, Var
 
 from pyomo_fesd import marks
 from pyomo_fesd.dcs.modes import ModeEquations
+from pyomo_fesd.dcs.nested import Tree
 from pyomo_fesd.dcs.regions import conditions
 
 NAME = 'memory'
@@ -31,32 +31,35 @@ class MemorySystem:
 
     Attributes
     ----------
-    disjunction : DisjunctionData
-    modes : list of DisjunctData
+    tree : Tree
+    modes : list of Mode
     conditions : list of lists of expressions
         for each mode the c_ik of its region c_ik >= 0
     equations : ModeEquations
     """
 
-    disjunction: object
+    tree: Tree
     modes: list
     conditions: list
     equations: ModeEquations
+    regions = None  # they overlap, so signs do not tell the mode
+
+    @property
+    def disjunction(self):
+        """The outermost DisjunctionData."""
+        return self.tree.disjunction
 
 
-def read(reader, disjunction):
-    """Read one DisjunctionData whose last mode decides where regions overlap.
+def read(reader, tree, modes):
+    """Read a Disjunction whose last mode decides where regions overlap.
 
     Raises
     ------
     FesdError
         for what every Disjunction is refused for, but not for overlaps, gaps, or modes without a region
     """
-    modes = reader.modes(disjunction, fixed_are_left_out=False)
-    if len(modes) == 1:
-        return reader.read(disjunction)
-    equations, inequalities = reader.contents(disjunction, modes)
-    return MemorySystem(disjunction, modes, [[c for con in cons for c in conditions(con)] for cons in inequalities], equations)
+    equations, inequalities = reader.contents(tree, modes)
+    return MemorySystem(tree, modes, [[c for con in cons for c in conditions(con)] for cons in inequalities], equations)
 
 
 def applies(system):
@@ -73,44 +76,50 @@ def declare(block, index, modes):
     """Declare the components of the form over ``index`` (a tuple of sets) for a number of ``modes``."""
     block.modes = Set(dimen=1, initialize=range(1, modes + 1))
     block.conditions = Set(dimen=1)
-    block.nu = Var(*index, Set(dimen=1, initialize=[1] if modes == 2 else list(block.modes)), dense=False, bounds=(0, 1))
+    block.nu = Var(*index, Set(dimen=1, initialize=range(1, modes)), dense=False, bounds=(0, 1))
     block.weight = Expression(*index, block.modes)
     block.condition = Expression(*index, block.modes, block.conditions)
-    if modes > 2:
-        block.simplex = Constraint(*index)
 
 
 def add(block, index, system):
-    """Add one time of one Disjunction; returns the weight of each mode."""
-    nu = [block.nu[(*index, i)] for i in ([1] if len(system.modes) == 2 else block.modes)]
-    weights = [nu[0], 1 - nu[0]] if len(system.modes) == 2 else nu
-    for i, (weight, stated) in enumerate(zip(weights, system.conditions), start=1):
-        block.weight[(*index, i)] = weight
+    """Add one time of one Disjunction."""
+    nu = [block.nu[(*index, i)] for i in range(1, len(system.modes))]
+    for i, (one, stated) in enumerate(zip([*nu, 1 - sum(nu)], system.conditions), start=1):
+        block.weight[(*index, i)] = one
         for k, c in enumerate(stated, start=1):
             block.conditions.add(k)
             block.condition[(*index, i, k)] = c
         kept = tuple(block.condition[(*index, i, k)] for k in range(1, len(stated) + 1))
         marks.mark(block, marks.MEMORY, block.weight[(*index, i)], kept)
-    _take_given(system.modes, nu)
-    if len(nu) > 1:
-        block.simplex.add(index or None, sum(nu) == 1)
-    # all but one are independent: the last follows from the simplex
-    for variable in nu[1:] or nu:
+    for variable in nu:
+        variable.value = 1 / len(system.modes)
         marks.mark(block, marks.SELECTOR, variable)
-    return weights
+    _take_given(system.modes, nu)
 
 
 def _take_given(modes, nu):
-    """Initial values of nu; an indicator that the user fixed, as that of the mode at the first time, fixes it."""
-    for variable in nu:
-        variable.value = 1 / len(modes)
-    for i, disjunct in enumerate(modes):
-        if disjunct.indicator_var.fixed:
-            on = float(disjunct.indicator_var.value)
-            variable, given = (nu[i], on) if i < len(nu) else (nu[0], 1 - on)
-            variable.fix(given)
+    """An indicator that the user fixed, as that of the mode at the first time, fixes its multiplier."""
+    given = [{d.indicator_var.value for d in mode.disjuncts if d.indicator_var.fixed} for mode in modes]
+    on = [values == {True} for values in given]
+    for variable, one, values in zip(nu, on, given):
+        if any(on):
+            variable.fix(float(one))
+        elif False in values:
+            variable.fix(0.0)
+    if len(nu) == 1 and not any(on) and False in given[1]:
+        nu[0].fix(1.0)
+
+
+def weight(block, index, system, modes):
+    """The sum of the weights of some of the ``modes``, by number."""
+    return sum(block.weight[(*index, i + 1)] for i in modes)
+
+
+def owners(system):
+    """No pair belongs to a point in time; the conditions are those of the elements."""
+    return []
 
 
 def equations(block, index):
     """The equations of one time."""
-    return [block.simplex[index or None]] if block.component('simplex') is not None else []
+    return []

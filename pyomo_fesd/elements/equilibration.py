@@ -9,7 +9,7 @@ is 1 where the active set goes on and 0 where it changes.  (The raw product B_la
 
 A mode with memory has its weight in the place of theta; a jump of the state is a change.
 
-Takes: the families of ``cross``, the modes of ``memory``, the jumps on the block.
+Takes: the families of ``cross`` that switch by themselves, the modes of ``memory``, the jumps on the block.
 Leaves: ``eta``, ``equal_length`` (inactive), ``equilibration`` (a Complementarity), ``deviation`` (the penalty term).
 """
 
@@ -54,6 +54,7 @@ MODES = {'two_stage': two_stage, 'complementarity': complementarity, 'penalty': 
 
 def add_equilibration(block, families, modes, grid, mode, rho):
     """Add eta and the equilibration pairs between consecutive elements of each control stage."""
+    families = [f for f in families if not f.follows]
     by_number = {e.n: e for e in grid.elements}
     inner = [(e.n, f.n) for elements in grid.stages.values() for e, f in zip(elements, elements[1:])]
     block.theta = Expression(block.family, block.element)

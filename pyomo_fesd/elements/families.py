@@ -38,6 +38,8 @@ class Family:
     jumps_with_controls : tuple of bool
         for each continuous side, whether it contains a control that is held on each stage: no continuity from one stage to the
         next
+    follows : bool
+        both sides are functions of multipliers that jump: it switches only where the conditions of these do
     starts : dict element number -> Pair
         the sides after the left boundary of an element, where a state jumps there
     """
@@ -47,6 +49,7 @@ class Family:
     sides: dict
     continuous: tuple
     jumps_with_controls: tuple = (False, False)
+    follows: bool = False
     starts: dict = field(default_factory=dict)
 
     def points(self, element):
@@ -129,8 +132,9 @@ def read_families(conditions, continuity, times):
         if smooth == (True, False):
             sides, smooth = {t: (H, G) for t, (G, H) in sides.items()}, (False, True)
         jumps = tuple(s and continuity.jumps_at_stages(sides[inner][i]) for i, s in enumerate(smooth))
-        families.append(Family(names[name], family, sides, smooth, jumps))
-        if inner is not None and not any(smooth):
+        follows = inner is not None and not any(smooth) and all(map(_of_multipliers, sides[inner]))
+        families.append(Family(names[name], family, sides, smooth, jumps, follows))
+        if inner is not None and not any(smooth) and not follows:
             unknown.add(_source_name(family[inner], times))
     for name in sorted(unknown):
         logger.warning(
@@ -140,6 +144,11 @@ def read_families(conditions, continuity, times):
             name,
         )
     return families
+
+
+def _of_multipliers(expr):
+    """Whether a side contains generated variables only."""
+    return all(map(marks.is_generated, identify_variables(expr)))
 
 
 def _distinct_names(names):

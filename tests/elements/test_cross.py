@@ -6,6 +6,7 @@ import pyomo.environ as pyo
 import pytest
 import signum
 from pyomo.core.expr.visitor import identify_variables
+from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
@@ -178,6 +179,24 @@ def test_a_multiplier_that_jumps_with_a_control_does_not_reach_into_the_next_sta
     for m, expected in ((smooth, [1, 1.5]), (held, [1.5])):
         p = m.component('_pyomo_fesd_dcs').regulator.p
         pair = block(m).cross['regulator.complementarity[2]', 3]
+        assert labels_of(read(pair).H, p) == expected
+
+
+def test_of_several_switching_functions_only_those_with_a_held_control_jump_at_stages():
+    m = setpoint.build()
+    del m.regulator, m.regulator_disjuncts
+    m.regulator = Disjunction(
+        m.t,
+        rule=lambda m, t: [
+            [m.x[t] <= 5, m.dx[t] == 1],
+            [m.x[t] >= 5, m.x[t] <= m.u[t], m.dx[t] == 2],
+            [m.x[t] >= 5, m.x[t] >= m.u[t], m.dx[t] == 3],
+        ],
+    )
+    transform(m, 4, 1, form='heaviside', piecewise_constant=[m.u])
+    p = m.component('_pyomo_fesd_dcs').regulator_heaviside_2.p
+    for function, expected in ((1, [(1, 1), (1.5, 1)]), (2, [(1.5, 2)])):
+        pair = block(m).cross[f'regulator_heaviside_2.complementarity[{2 * function}]', 3]
         assert labels_of(read(pair).H, p) == expected
 
 

@@ -100,6 +100,20 @@ def test_a_disjunction_with_further_indices_gets_all_combinations():
     assert texts(m.high['b', m.t.at(2)]) == [f'1  <=  x[{m.t.at(2)}]']
 
 
+def test_a_logical_constraint_over_time_gets_every_new_time_by_its_rule():
+    m = signum.build()
+    m.i = pyo.Set(initialize=['a', 'b'])
+    literals = {'a': lambda m, t: m.below[t].indicator_var, 'b': lambda m, t: m.sgn[t].disjuncts[1].indicator_var}
+    m.logic = pyo.LogicalConstraint(
+        m.i, m.t, rule=lambda m, i, t: pyo.LogicalConstraint.Skip if t == 0 else literals[i](m, t).lor(m.above[t].indicator_var)
+    )
+    expand(m)
+    assert set(m.logic) == {(i, t) for i in m.i for t in m.t if t != 0}
+    assert m.logic.ctype is pyo.LogicalConstraint and all(c.active for c in m.logic.values())
+    t = m.t.at(2)
+    assert str(m.logic['a', t].expr) == f'below[{t}].indicator_var ∨ above[{t}].indicator_var'
+
+
 def test_a_complementarity_over_time_gets_every_new_time_by_its_rule():
     m = states()
     m.i = pyo.RangeSet(2)
@@ -303,10 +317,6 @@ def over_time(ctype, rule=None):
     return lambda m: setattr(m, 'bad', ctype(m.t, **({} if rule is None else {'rule': rule})))
 
 
-def logic(m):
-    m.bad = pyo.LogicalConstraint(m.t, rule=lambda m, t: m.below[t].indicator_var.implies(m.below[t].indicator_var))
-
-
 def hand_filled_disjunct(m):
     m.bad = Disjunct(m.t)
     for t in m.t:
@@ -317,6 +327,12 @@ def hand_filled_disjunction(m):
     m.bad = Disjunction(m.t)
     for t in m.t:
         m.bad[t] = [[m.x[t] >= 0], [m.x[t] <= 0]]
+
+
+def hand_filled_logic(m):
+    m.bad = pyo.LogicalConstraint(m.t)
+    for t in m.t:
+        m.bad[t] = m.below[t].indicator_var
 
 
 def hand_filled_complementarity(m):
@@ -331,10 +347,10 @@ REFUSED = {
         lambda m: setattr(m, 'bad', pyo.SOSConstraint(m.t, rule=lambda m, t: ([m.x[t]], [1]), sos=1)),
         'declare it after the discretisation',
     ),
-    'LogicalConstraint': (logic, 'regions of a Disjunction'),
     'BooleanVar': (over_time(pyo.BooleanVar), 'regions of a Disjunction'),
     'Set': (lambda m: setattr(m, 'bad', pyo.Set(m.t, initialize=[1])), 'a Set that does not depend on time'),
     'hand-filled Disjunct': (hand_filled_disjunct, 'declare it with a rule'),
+    'hand-filled LogicalConstraint': (hand_filled_logic, 'declare it with a rule'),
     'hand-filled Disjunction': (hand_filled_disjunction, 'declare it with a rule'),
     'hand-filled Complementarity': (hand_filled_complementarity, 'declare it with a rule'),
 }
@@ -412,6 +428,12 @@ def failing_disjunction(m):
     m.bad = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= fails(t)], [m.x[t] >= 1]])
 
 
+def failing_logic(m):
+    m.bad = pyo.LogicalConstraint(
+        m.t, rule=lambda m, t: pyo.atleast(fails(t), m.below[t].indicator_var, m.above[t].indicator_var)
+    )
+
+
 def failing_complementarity(m):
     m.bad = Complementarity(m.t, rule=lambda m, t: complements(m.x[t] >= -9 * fails(t), m.x[t] <= 9))
 
@@ -445,6 +467,7 @@ FAILING = (
     failing_block,
     failing_disjunct,
     failing_disjunction,
+    failing_logic,
     failing_complementarity,
     failing_reference,
     missing_name,
