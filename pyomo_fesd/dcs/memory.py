@@ -16,7 +16,7 @@ Does not apply: to a model on a fixed grid, where no element boundary can lie on
 
 from dataclasses import dataclass
 
-from pyomo.core import Constraint, Expression, Set, Var
+from pyomo.core import Expression, Set, Var
 
 from pyomo_fesd import marks
 from pyomo_fesd.dcs.modes import ModeEquations
@@ -73,44 +73,42 @@ def declare(block, index, modes):
     """Declare the components of the form over ``index`` (a tuple of sets) for a number of ``modes``."""
     block.modes = Set(dimen=1, initialize=range(1, modes + 1))
     block.conditions = Set(dimen=1)
-    block.nu = Var(*index, Set(dimen=1, initialize=[1] if modes == 2 else list(block.modes)), dense=False, bounds=(0, 1))
+    block.nu = Var(*index, Set(dimen=1, initialize=range(1, modes)), dense=False, bounds=(0, 1))
     block.weight = Expression(*index, block.modes)
     block.condition = Expression(*index, block.modes, block.conditions)
-    if modes > 2:
-        block.simplex = Constraint(*index)
 
 
 def add(block, index, system):
     """Add one time of one Disjunction; returns the weight of each mode."""
-    nu = [block.nu[(*index, i)] for i in ([1] if len(system.modes) == 2 else block.modes)]
-    weights = [nu[0], 1 - nu[0]] if len(system.modes) == 2 else nu
-    for i, (weight, stated) in enumerate(zip(weights, system.conditions), start=1):
+    nu = [block.nu[(*index, i)] for i in range(1, len(system.modes))]
+    weights = []
+    for i, (weight, stated) in enumerate(zip([*nu, 1 - sum(nu)], system.conditions), start=1):
         block.weight[(*index, i)] = weight
+        weights.append(block.weight[(*index, i)])
         for k, c in enumerate(stated, start=1):
             block.conditions.add(k)
             block.condition[(*index, i, k)] = c
         kept = tuple(block.condition[(*index, i, k)] for k in range(1, len(stated) + 1))
-        marks.mark(block, marks.MEMORY, block.weight[(*index, i)], kept)
-    _take_given(system.modes, nu)
-    if len(nu) > 1:
-        block.simplex.add(index or None, sum(nu) == 1)
-    # all but one are independent: the last follows from the simplex
-    for variable in nu[1:] or nu:
+        marks.mark(block, marks.MEMORY, weights[-1], kept)
+    for variable in nu:
+        variable.value = 1 / len(system.modes)
         marks.mark(block, marks.SELECTOR, variable)
+    _take_given(system.modes, nu)
     return weights
 
 
 def _take_given(modes, nu):
-    """Initial values of nu; an indicator that the user fixed, as that of the mode at the first time, fixes it."""
-    for variable in nu:
-        variable.value = 1 / len(modes)
-    for i, disjunct in enumerate(modes):
-        if disjunct.indicator_var.fixed:
-            on = float(disjunct.indicator_var.value)
-            variable, given = (nu[i], on) if i < len(nu) else (nu[0], 1 - on)
-            variable.fix(given)
+    """An indicator that the user fixed, as that of the mode at the first time, fixes its multiplier."""
+    on = [d.indicator_var.fixed and d.indicator_var.value for d in modes]
+    for variable, disjunct, one in zip(nu, modes, on):
+        if any(on):
+            variable.fix(float(one))
+        elif disjunct.indicator_var.fixed:
+            variable.fix(0.0)
+    if len(nu) == 1 and modes[1].indicator_var.fixed and not modes[1].indicator_var.value:
+        nu[0].fix(1.0)
 
 
 def equations(block, index):
     """The equations of one time."""
-    return [block.simplex[index or None]] if block.component('simplex') is not None else []
+    return []

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
-from pyomo.core import Block, ConstraintList, RangeSet, Set, quicksum
+from pyomo.core import Block, Constraint, ConstraintList, RangeSet, Set, quicksum
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
@@ -203,15 +203,22 @@ def _pairs(family, element, right_is_stage, form):
 
 
 def _add_signs(block, families):
-    """G >= 0 and H >= 0 at every point, where the bounds of the variables do not say so already."""
+    """G >= 0 and H >= 0 at every point and after every jump, where the bounds of the variables do not say so already."""
     block.nonnegative = ConstraintList()
-    lower = ExpressionBoundsVisitor()
+    block.sign_after = Constraint(block.family, block.element, [1, 2])
     for family in families:
         for pair in family.sides.values():
-            for expr in pair:
-                low = expr.lb if expr.is_variable_type() else lower.walk_expression(expr)[0]
-                if low is None or low < 0:
-                    block.nonnegative.add(expr >= 0)
+            for expr in filter(_may_be_negative, pair):
+                block.nonnegative.add(expr >= 0)
+        for n, pair in family.starts.items():
+            for side, expr in enumerate(pair, start=1):
+                if _may_be_negative(expr):
+                    block.sign_after.add((family.name, n, side), expr >= 0)
+
+
+def _may_be_negative(expr):
+    low = expr.lb if expr.is_variable_type() else ExpressionBoundsVisitor().walk_expression(expr)[0]
+    return low is None or low < 0
 
 
 def _hold_left_limits(block, families, grid, wrt):
