@@ -9,6 +9,8 @@ Leaves: values of everything over time: the solution of a system without freedom
 Does not apply: to systems with freedom; inputs have to be given.
 """
 
+import logging
+
 from pyomo.common.collections import ComponentMap, ComponentSet
 
 from pyomo_fesd.elements.cross import grid_of
@@ -23,7 +25,9 @@ from pyomo_fesd.march.window import Window
 from pyomo_fesd.records import records
 from pyomo_fesd.review import review
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
-from pyomo_fesd.trajectory import trajectory
+from pyomo_fesd.trajectory import physical_time, trajectory
+
+logger = logging.getLogger('pyomo_fesd')
 
 #: A step shorter than this part of its share is none.
 NO_STEP = 1e-9
@@ -112,7 +116,7 @@ class March:
         while True:
             stage = self._through(reserve)
             if stage is None:
-                return
+                return self._warn_short()
             reserve[stage] = self._expected(stage)
             if tuple(reserve.values()) in tried:
                 raise self._used_up(stage)
@@ -215,6 +219,22 @@ class March:
             limits = [row for memory in self._memories for row in memory.limits(element)]
             self._equations[element.n] = self._reader.element(element, [*limits, *self._jumps.limits(element)])
         return self._equations[element.n]
+
+    def _warn_short(self):
+        """Where less time lies between two switches than an element must have, the full problem has no solution like this one."""
+        for stage, elements in self._grid.stages.items():
+            begin = physical_time(self._model, self._wrt)[elements[0].left]
+            ends = [*(time for time, _ in self._events[stage]), begin + sum(e.length * self._block.r[e.n].value for e in elements)]
+            least = min(e.length * (self._block.r[e.n].lb or 0.0) for e in elements)
+            for a, b in zip([begin, *ends], ends):
+                if 0 < b - a < least * (1 - CUT):
+                    logger.warning(
+                        "simulate: from time %.6g to %.6g there is less time between two switches than the least element length "
+                        "%.3g, so mpec_hybrid will not find this solution. Take more elements (nfe) or a larger length_bounds.",
+                        a,
+                        b,
+                        least,
+                    )
 
     def _require(self, results):
         if results.solver.stationarity != 'B':
