@@ -13,7 +13,7 @@ Leaves: the families with ``starts``; ``copy`` (Vars) and ``copied`` (Constraint
 Does not apply: to variables of which the user only says that they are continuous.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import replace
 
 from pyomo.common.collections import ComponentMap, ComponentSet
@@ -101,6 +101,7 @@ class _Ties:
         self._times, self._inside = times, continuity.inside
         self._names = {times.split(v)[1] for v in continuity.inside if not v.is_indexed()}
         self._given = ComponentSet(d.get_state_var() for d in derivatives(model, times.wrt)) | held | ComponentSet(told)
+        self._parts = ComponentSet(v for v, rule in continuity.rules.items() if rule.ctype is Constraint)
         self._relations = defaultdict(ComponentMap)
         labels = {e.right for e in grid.elements[:-1]}
         for row in model.component_data_objects(Constraint, active=True, descend_into=Block):
@@ -115,9 +116,10 @@ class _Ties:
     def _add(self, label, row, mentioned):
         """A relation between continuous variables; rows with others (nu, rates) tell nothing about these."""
         if all(map(self._continuous, mentioned)):
+            relation = (row, mentioned)
             for v in mentioned:
                 if self._algebraic(v):
-                    self._relations[label].setdefault(v, []).append((row, mentioned))
+                    self._relations[label].setdefault(v, []).append(relation)
 
     def _continuous(self, v):
         if self._times.time(v) is None or v.parent_component() in self._inside:
@@ -127,18 +129,35 @@ class _Ties:
     def _algebraic(self, v):
         return self._times.time(v) is not None and v.parent_component() not in self._given
 
-    def closure(self, label, variables):
-        """The algebraic variables at ``label`` that ``variables`` hang together with, and the relations ``(row, variables)``."""
-        found, relations, waiting = ComponentSet(), [], [v for v in variables if self._algebraic(v)]
+    def closure(self, label, wanted):
+        """The algebraic variables at ``label`` that ``wanted`` depend on, and the relations ``(row, variables)`` between them."""
+        found, relations, waiting = ComponentSet(), {}, [v for v in wanted if self._algebraic(v)]
         while waiting:
             v = waiting.pop()
-            if v in found or v not in self._relations[label]:
-                continue
-            found.add(v)
-            for row, mentioned in self._relations[label][v]:
-                relations.append((row, mentioned))
-                waiting += [u for u in mentioned if self._algebraic(u)]
-        return found, relations
+            if v not in found and v in self._relations[label]:
+                found.add(v)
+                for relation in self._relations[label][v]:
+                    relations[id(relation)] = relation
+                    waiting += [u for u in relation[1] if self._algebraic(u)]
+        relations = self._without_results(list(relations.values()), ComponentSet(wanted))
+        left = ComponentSet(v for _, mentioned in relations for v in mentioned)
+        return [v for v in found if v in left], relations
+
+    def _without_results(self, relations, wanted):
+        """A variable in one relation only is its result: both go, unless it is wanted, or a part that pairs determine too."""
+        while True:
+            number = Counter(id(v) for _, mentioned in relations for v in ComponentSet(mentioned))
+            kept = [
+                (row, mentioned)
+                for row, mentioned in relations
+                if not any(number[id(v)] == 1 and self._is_result(v) and v not in wanted for v in mentioned)
+            ]
+            if len(kept) == len(relations):
+                return kept
+            relations = kept
+
+    def _is_result(self, v):
+        return self._algebraic(v) and v.parent_component() not in self._parts
 
 
 def _variables(expr):

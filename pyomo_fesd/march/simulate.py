@@ -155,14 +155,16 @@ class March:
         self._jumps.begin()
         for memory in self._memories:
             memory.begin(self._wrt.first())
-        cut = True
+        warm = False
         for stage, elements in self._grid.stages.items():
             rest = sum(e.length for e in elements)
             for number, element in enumerate(elements):
                 left, expected = len(elements) - number, max(0, reserve[stage] - len(self._events[stage]))
                 share = rest / max(1, left - expected)
-                h, happened = self._advance(element, share, warm=not cut)
+                h, happened = self._advance(element, share, warm)
                 cut = h < share * (1 - CUT)
+                # after a switch another active set holds
+                warm = bool(happened) or not cut
                 rest, self._time = rest - h, self._time + h
                 if cut or happened:
                     self._events[stage].append((self._time, ', '.join(happened) or 'switch'))
