@@ -30,6 +30,8 @@ PENALTY            Expression                its weight rho; guides the homotopy
 
 from pyomo.core import Block, Suffix
 
+from pyomo_fesd.timeindex import TimeIndex
+
 CONTINUOUS = 'fesd_continuous'
 SELECTOR = 'fesd_selector'
 INDICATOR = 'fesd_indicator'
@@ -68,10 +70,12 @@ def marked(block, name, used=False):
         yield from suffix.items()
 
 
-def use_up(block, name):
-    """What mark ``name`` asks for has been done: ``marked`` does not find it any more."""
+def use_up(block, name, wrt):
+    """What mark ``name`` asks for over ``wrt`` has been done: ``marked`` does not find it any more."""
+    times = TimeIndex(wrt)
     for suffix in list(suffixes(block, name)):
-        suffix.deactivate()
+        if all(times.time(component) is not None for component in suffix):
+            suffix.deactivate()
 
 
 def is_generated(component):

@@ -11,7 +11,7 @@ from pyomo.gdp import Disjunct, Disjunction
 from pyomo_fesd import marks
 from pyomo_fesd.conditions import conditions, positions, positive
 from pyomo_fesd.elements.grid import ONE_ELEMENT_SCHEMES, read_grid
-from pyomo_fesd.elements.jumps import jumping_states, read_jumps
+from pyomo_fesd.elements.jumps import read_jumps, values_after
 from pyomo_fesd.elements.lengths import duration
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.records import records
@@ -148,8 +148,7 @@ def jumps_that_happen(model, wrt):
     for element in _grid(wrt).elements[:-1] if jumps else ():
         names = [j.name for j in jumps if (home.e[j.name, element.n].value or 0.0) > 0.5]
         if names:
-            states = jumping_states(jumps, element.right)
-            after = [(x, home.after[element.n, j].value) for j, x in enumerate(states, start=1)]
+            after = [(x, value(expr)) for x, expr in values_after(home, jumps, element).items()]
             yield element, element.right, ', '.join(names), after
 
 

@@ -9,7 +9,7 @@ Does not apply: to complementarities without time.
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
-from pyomo.core import Block, ConstraintList, RangeSet, Set, quicksum
+from pyomo.core import Block, Constraint, ConstraintList, RangeSet, Set, quicksum
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
@@ -86,14 +86,19 @@ def _pairs(family, element, right_is_stage, form):
 
 
 def _add_signs(block, families):
-    """G >= 0 and H >= 0 at every point, where the bounds of the variables do not say so already."""
+    """G >= 0 and H >= 0 at every point and after every jump, where the bounds of the variables do not say so already."""
     block.nonnegative = ConstraintList()
+    block.sign_after = Constraint(block.family, block.element, [1, 2])
     lower = ExpressionBoundsVisitor()
     for family in families:
         for pair in family.sides.values():
             for expr in pair:
                 if not _never_negative(expr, lower):
                     block.nonnegative.add(expr >= 0)
+        for n, pair in family.starts.items():
+            for side, expr in enumerate(pair, start=1):
+                if not _never_negative(expr, lower):
+                    block.sign_after.add((family.name, n, side), expr >= 0)
 
 
 def _never_negative(expr, lower):

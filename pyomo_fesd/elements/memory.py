@@ -20,6 +20,7 @@ import re
 from dataclasses import dataclass
 
 from pyomo.core import Block, Constraint, Set, Var, quicksum, value
+from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
@@ -35,17 +36,19 @@ class Mode:
     name : str
     system : str
         the Disjunction that it belongs to, by the family name of its weights
-    weights : dict label -> expression
+    weights : dict label -> ExpressionData
     conditions : dict label -> tuple of expressions c >= 0
-    independent : bool
-        whether its weight is a variable of its own; the last one follows from the others
     """
 
     name: str
     system: str
     weights: dict
     conditions: dict
-    independent: bool
+
+    @property
+    def independent(self):
+        """Whether its weight is a variable of its own; the last one follows from the others."""
+        return next(iter(self.weights.values())).expr.is_variable_type()
 
     def weight(self, element):
         """nu_{n,i}: the value at the last stage of the element stands for all of it."""
@@ -58,19 +61,18 @@ class Mode:
 
 
 def read_modes(model, wrt):
-    """The modes with memory of a model, from the marks, also after they are used up."""
+    """The modes with memory over ``wrt``, from the marks, also after they are used up."""
     times, marked = TimeIndex(wrt), {}
-    selectors = {id(v) for v, _ in marks.marked(model, marks.SELECTOR)}
     for weight, conditions in marks.marked(model, marks.MEMORY, used=True):
         label, name = times.split(weight)
-        marked.setdefault(name, {})[label] = (weight.expr, conditions)
+        if label is not None:
+            marked.setdefault(name, {})[label] = (weight, conditions)
     return [
         Mode(
             name,
             re.sub(r',?\d+\]$', ']', name),
             {t: weight for t, (weight, _) in family.items()},
             {t: tuple(c.expr for c in conditions) for t, (_, conditions) in family.items()},
-            all(id(weight) in selectors for weight, _ in family.values()),
         )
         for name, family in marked.items()
     ]
@@ -80,58 +82,67 @@ def add_memory(block, modes, grid, wrt):
     """Put the law of switching between the elements of ``grid`` on ``block``; the marks are used up."""
     if not modes:
         return
-    marks.use_up(block.model(), marks.MEMORY)
+    marks.use_up(block.model(), marks.MEMORY, wrt)
     most = max((len(cs) for mode in modes for cs in mode.conditions.values()), default=0)
     block.memory = memory = Block()
     memory.mode = Set(initialize=[m.name for m in modes], ordered=True)
     memory.boundary = Set(initialize=range(len(grid.elements) + 1), ordered=True)
     memory.number = Set(initialize=range(1, most + 1), ordered=True)
     index = (memory.mode, memory.boundary, memory.number)
-    for name in 'pn':
-        memory.add_component(name, Var(*index, dense=False, bounds=(0, None)))
+    memory.n = Var(*index, dense=False, bounds=(0, None))
     memory.d = Var(*index, dense=False, bounds=(0, 1))
-    memory.switching = Constraint(*index)
     memory.leave = Constraint(memory.mode, memory.boundary)
+    memory.one = Constraint(memory.mode, memory.boundary)
     memory.binary = Complementarity(memory.mode, memory.boundary)
     for name in ('parts', 'region', 'leaving'):
         memory.add_component(name, Complementarity(*index))
-    memory.hold = Constraint(memory.mode, wrt)
     for mode in modes:
+        _hold(mode, grid, wrt)
+    for mode in modes:
+        _add_elements(memory, mode, grid)
         _add_boundaries(memory, mode, grid, wrt)
+
+
+def _hold(mode, grid, wrt):
+    """One weight for all points of an element; the first time belongs to the first element."""
+    for element in grid.elements:
+        labels = dict.fromkeys((*((wrt.first(),) if element.n == 1 else ()), *element.points, element.right))
+        weights = [mode.weights[t] for t in labels if t in mode.weights]
+        nu = mode.weight(element).expr
+        if nu.is_variable_type():
+            given = next((w.expr for w in weights if w.expr.fixed), nu)
+            if given.fixed:
+                nu.fix(given.value)
+        for weight in weights:
+            weight.set_value(nu)
+
+
+def _add_elements(memory, mode, grid):
+    """nu is 0 or 1; the last mode's weight follows from the others and only has to be no less than 0."""
+    for element in grid.elements:
+        nu = mode.weight(element)
         if mode.independent:
-            _add_elements(memory, mode, grid, wrt)
+            memory.binary.add((mode.name, element.n), complements(nu.expr >= 0, 1 - nu.expr >= 0))
+        elif len(list(identify_variables(nu))) > 1:
+            memory.one.add((mode.name, element.n), nu >= 0)
 
 
 def _add_boundaries(memory, mode, grid, wrt):
     labels = [wrt.first(), *(e.right for e in grid.elements)]
-    weights = [None, *map(mode.weight, grid.elements), None]
+    weights = [None, *(mode.weight(e).expr for e in grid.elements), None]
     for b, label in enumerate(labels):
         before, after = weights[b], weights[b + 1]
         sides = [w for w in (before, after) if w is not None]
         inner, left = len(sides) == 2, []
         for k, c in enumerate(mode.conditions[label], start=1):
-            p, n = memory.p[mode.name, b, k], memory.n[mode.name, b, k]
-            now = value(c, exception=False) or 0.0
-            p.value, n.value = max(now, 0.0), max(-now, 0.0)
-            memory.switching.add((mode.name, b, k), c == p - n)
-            memory.parts.add((mode.name, b, k), complements(n >= 0, p >= 0))
+            n = memory.n[mode.name, b, k]
+            n.value = max(-(value(c, exception=False) or 0.0), 0.0)
+            memory.parts.add((mode.name, b, k), complements(n >= 0, n + c >= 0))
             memory.region.add((mode.name, b, k), complements(n >= 0, quicksum(sides) >= 0))
             if inner:
                 d = memory.d[mode.name, b, k]
                 d.value = 0.0
                 left.append(d)
-                memory.leaving.add((mode.name, b, k), complements(d >= 0, p >= 0))
+                memory.leaving.add((mode.name, b, k), complements(d >= 0, n + c >= 0))
         if inner:
             memory.leave.add((mode.name, b), before - after <= quicksum(left))
-
-
-def _add_elements(memory, mode, grid, wrt):
-    """nu is 0 or 1, and the same at all points of an element; the first time belongs to the first element."""
-    for element in grid.elements:
-        nu = mode.weight(element)
-        memory.binary.add((mode.name, element.n), complements(nu >= 0, 1 - nu >= 0))
-        labels = dict.fromkeys((*element.points[:-1], element.right, *((wrt.first(),) if element.n == 1 else ())))
-        for label in labels:
-            other = mode.weights.get(label)
-            if other is not None and other is not nu:
-                memory.hold.add((mode.name, label), other == nu)

@@ -45,7 +45,7 @@ def _start_short(home, block, grid, changed):
 
 #: Pairs that belong to elements and pairs that belong to boundaries, by the block below that of the grid that holds them.
 ELEMENTS = ((None, 'cross'), ('memory', 'binary'))
-BOUNDARIES = (('memory', 'region'), ('memory', 'leaving'), ('jumps', 'happens'), ('jumps', 'binary'))
+BOUNDARIES = (('memory', 'parts'), ('memory', 'region'), ('memory', 'leaving'), ('jumps', 'happens'), ('jumps', 'binary'))
 
 
 def _pairs(block, changed, boundary, step):

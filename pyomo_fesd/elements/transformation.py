@@ -20,13 +20,14 @@ from pyomo_fesd.elements.families import (
 )
 from pyomo_fesd.elements.free_time import check_free_time, factors
 from pyomo_fesd.elements.grid import check_resolution, read_grid, share_elements
-from pyomo_fesd.elements.jumps import add_jumps, read_jumps, start_after_jumps
+from pyomo_fesd.elements.jumps import add_jumps, read_jumps
 from pyomo_fesd.elements.lengths import add_lengths, check_orders, multiply_derivatives
 from pyomo_fesd.elements.memory import add_memory, read_modes
 from pyomo_fesd.elements.mixed import split_mixed
 from pyomo_fesd.elements.moves import add_moves
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
 from pyomo_fesd.elements.restore import restored_on_error
+from pyomo_fesd.elements.right_limits import start_after_jumps
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set
 
@@ -197,7 +198,7 @@ class FiniteElements(Transformation):
             hold_controls(block, config.piecewise_constant, grid, wrt)
             multiply_derivatives(instance.model(), wrt, block, grid)
             add_jumps(block, jumps, grid, wrt)
-            families = start_after_jumps(block, families, jumps, grid, wrt)
+            families = start_after_jumps(block, families, jumps, grid, times, continuity, config)
             add_memory(block, modes, grid, wrt)
             add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
             if families or modes or jumps:

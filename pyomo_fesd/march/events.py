@@ -1,16 +1,33 @@
 """What happens between two elements of a march: a mode with memory ends, a state jumps.
 
-Both are decided by the values at the end of an element.  Inside an element the weights of the modes and the values after a jump
-are given; conditions and guards are kept >= 0, so the element ends where one of them would become negative.
+Both happen where a function that must not become negative arrives at zero from above: a condition of the active mode, a guard.
+An element ends at the latest where one of its stage points has arrived.
 """
 
 from pyomo.core import value
 
-from pyomo_fesd.elements.jumps import jumping_states
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.march.equations import own_labels
 
-#: A condition or guard below this has ended.
-ENDED = 1e-7
+#: A function below this part of the largest value that it has had is zero.
+ZERO = 1e-7
+
+
+class Arrivals:
+    """Where functions fall to zero; remembers how large each of them has been."""
+
+    def __init__(self):
+        self._largest = {}
+
+    def zero(self, key, values):
+        """The size below which the function is zero."""
+        self._largest[key] = max(self._largest.get(key, 0.0), *map(abs, values))
+        return ZERO * self._largest[key]
+
+    def first(self, key, values):
+        """Place of the first of ``values`` that is zero after one that was not; None if there is none."""
+        zero = self.zero(key, values)
+        return next((i for i in range(1, len(values)) if values[i] <= zero < values[i - 1]), None)
 
 
 class Memory:
@@ -19,66 +36,91 @@ class Memory:
     Parameters
     ----------
     modes : list of elements.memory.Mode
+    home : Block
+        what ``fesd.finite_elements`` made of them
     """
 
-    def __init__(self, modes):
-        self._modes, self._active = modes, None
+    def __init__(self, modes, home):
+        self.name = modes[0].system
+        self._modes, self._home, self._active, self._arrivals = modes, home, None, Arrivals()
 
     def begin(self, label):
         """The mode at the first time: the one that is fixed there, or the only one whose conditions hold."""
-        given = [m for m in self._modes if m.weights[label].is_fixed() and value(m.weights[label]) > 0.5]
-        possible = given or [m for m in self._modes if _room(m, label) >= 0]
+        on = [m for m in self._modes if value(m.weights[label]) > 0.5]
+        fixed = all(v.fixed for v in self.variables(label))
+        possible = on if fixed else [m for m in self._modes if all(c >= 0 for c in _conditions(m, label))]
         if len(possible) != 1:
             raise FesdError(
-                self._modes[0].system,
-                f"{len(possible)} modes are possible at the first time",
-                "fix the indicator of the mode that comes first, e.g. m.heating[0].indicator_var.fix(True)",
+                self.name,
+                f"simulate: {len(possible)} modes are possible at the first time",
+                "fix the indicator of the one that comes first, e.g. m.heating[0].indicator_var.fix(True), before fesd.dcs",
             )
         self._active = possible[0]
 
-    def variables(self):
-        """The weights that are variables of their own."""
-        return [w for m in self._modes for w in m.weights.values() if w.is_variable_type()]
+    def variables(self, label):
+        """The weights at one time that are variables of their own."""
+        return [m.weights[label].expr for m in self._modes if m.weights[label].expr.is_variable_type()]
 
-    def rows(self, label):
-        """The conditions at one time, each for its mode only: nu c + (1 - nu) >= 0."""
-        return [m.weights[label] * c + (1 - m.weights[label]) >= 0 for m in self._modes for c in m.conditions[label]]
+    def limits(self, element):
+        """The conditions in an element, each for its mode only: nu c + (1 - nu) >= 0."""
+        labels = own_labels(element)
+        return [m.weight(element) * c + (1 - m.weight(element)) >= 0 for m in self._modes for t in labels for c in m.conditions[t]]
 
-    def set_weights(self, labels):
-        """Give nu its values at the labels of an element."""
+    def set_weights(self, element):
+        """Give nu its value in an element."""
         for mode in self._modes:
-            for weight in (mode.weights[t] for t in labels if t in mode.weights):
-                if weight.is_variable_type():
-                    weight.set_value(float(mode is self._active), skip_validation=True)
+            if mode.independent:
+                mode.weight(element).expr.set_value(float(mode is self._active), skip_validation=True)
+
+    def arrived(self, element):
+        """For each condition of the active mode the place in (left, own labels) where it has fallen to zero, or None."""
+        labels, found = (element.left, *own_labels(element)), []
+        for mode in self._modes:
+            for k, values in enumerate(zip(*(_conditions(mode, t) for t in labels))):
+                place = self._arrivals.first((mode.name, k), values)
+                found += [place] if mode is self._active else []
+        return found
 
     def end(self, label):
-        """Change the mode if a condition of the active one has ended at ``label``; returns whether it has."""
-        if _room(self._active, label) > ENDED:
-            return False
-        others = [m for m in self._modes if m is not self._active and _room(m, label) >= -ENDED]
-        if not others:
-            raise FesdError(self._active.name, "no other mode is possible where this one ends", "let the regions overlap")
-        self._active = max(others, key=lambda m: _room(m, label))
-        return True
+        """The active mode has ended at ``label``: another one begins.
 
-    def settle(self, home, grid, first):
-        """What the law of switching between elements says at the values of the march: p, n and d at every boundary."""
+        Raises
+        ------
+        FesdError
+            if none or several can follow
+        """
+        room = [(m, min(self._room(m, label), default=1.0)) for m in self._modes if m is not self._active]
+        inside = [m for m, space in room if space > 0]
+        possible = inside or [m for m, space in room if space >= 0]
+        if len(possible) != 1:
+            names = ', '.join(m.name for m in possible) or 'none'
+            raise FesdError(
+                self._active.name,
+                f"simulate: {len(possible)} modes can follow where this one ends ({names})",
+                "state the regions so that where a mode ends the point lies in one other region",
+            )
+        self._active = possible[0]
+
+    def _room(self, mode, label):
+        """Values of the conditions; 0 for those that are zero."""
+        for k, c in enumerate(_conditions(mode, label)):
+            yield 0.0 if abs(c) <= self._arrivals.zero((mode.name, k), [c]) else c
+
+    def settle(self, grid, first):
+        """What the law of switching between elements says at the values of the march: n and d at every boundary."""
         labels = [first, *(e.right for e in grid.elements)]
         for mode in self._modes:
             weights = [value(mode.weight(e)) for e in grid.elements]
             for b, label in enumerate(labels):
-                now = [value(c) for c in mode.conditions[label]]
                 left = 0 < b < len(grid.elements) and weights[b - 1] > weights[b]
-                for k, c in enumerate(now, start=1):
-                    c = 0.0 if abs(c) <= ENDED else c
-                    home.p[mode.name, b, k].set_value(max(c, 0.0), skip_validation=True)
-                    home.n[mode.name, b, k].set_value(max(-c, 0.0), skip_validation=True)
-                    if (mode.name, b, k) in home.d:
-                        home.d[mode.name, b, k].set_value(float(left and c <= ENDED), skip_validation=True)
+                for k, c in enumerate(self._room(mode, label), start=1):
+                    self._home.n[mode.name, b, k].set_value(max(-c, 0.0), skip_validation=True)
+                    if (mode.name, b, k) in self._home.d:
+                        self._home.d[mode.name, b, k].set_value(float(left and c == 0), skip_validation=True)
 
 
-def _room(mode, label):
-    return min((value(c) for c in mode.conditions[label]), default=float('inf'))
+def _conditions(mode, label):
+    return [value(c) for c in mode.conditions[label]]
 
 
 class Jumps:
@@ -92,51 +134,34 @@ class Jumps:
     """
 
     def __init__(self, jumps, home):
-        self._jumps, self._home = jumps, home
+        self._jumps, self._home, self._arrivals, self._just = jumps, home, Arrivals(), set()
 
-    def rows(self, label):
-        """The guards at one time."""
-        return [j.guards[label] >= 0 for j in self._jumps]
+    def begin(self):
+        """No jump yet."""
+        self._just = set()
 
-    def variables(self):
-        """The values after the boundaries."""
-        return list(self._home.after.values()) if self._home is not None else []
+    def limits(self, element):
+        """The guards in an element."""
+        return [j.guards[t] >= 0 for j in self._jumps for t in own_labels(element)]
 
-    def stay(self, boundary, label, times):
-        """No jump: the values after ``boundary`` are the states at ``label``."""
-        for j, x in enumerate(jumping_states(self._jumps, next(iter(self._jumps[0].resets))) if self._jumps else (), start=1):
-            self._home.after[boundary, j].set_value(times.at(x, label).value, skip_validation=True)
+    def arrived(self, element):
+        """For each law the place in (left, own labels) where its guard has fallen to zero, or None.
 
-    def end(self, boundary, label, limited):
-        """Jump at an inner boundary if the element was cut short and a guard is zero; returns whether it did."""
-        if self._home is None or boundary not in self._home.boundary:
-            return False
-        happened = False
+        Where a law has just reset the state the guard is zero on the left, but not after the jump: the left does not count.
+        """
+        return [self._place(jump, element) for jump in self._jumps]
+
+    def _place(self, jump, element):
+        skipped = int(jump.name in self._just)
+        values = [value(jump.guards[t]) for t in (element.left, *own_labels(element))]
+        place = self._arrivals.first(jump.name, values[skipped:])
+        return None if place is None else place + skipped
+
+    def end(self, element, arrived):
+        """Jump at the right boundary where the guard has arrived there; returns the names of the laws that do."""
+        last = len(own_labels(element))
+        self._just = {j.name for j, place in zip(self._jumps, arrived) if place == last}
         for jump in self._jumps:
-            now = limited and value(jump.guards[label]) <= ENDED
-            self._home.e[jump.name, boundary].set_value(float(now), skip_validation=True)
-            happened = happened or now
-        for j in range(1, 1 + len(jumping_states(self._jumps, label))):
-            self._home.after[boundary, j].set_value(value(self._home.reset[boundary, j].expr.args[1]), skip_validation=True)
-        return happened
-
-    def copies(self, boundary):
-        """The copies of multipliers after a boundary, by place, and their rows."""
-        home = self._home
-        if home is None:
-            return {}, []
-        rows = [c.expr for (b, _), c in home.copied.items() if b == boundary]
-        return {k: v for (b, k), v in home.copy.items() if b == boundary}, rows
-
-    def take(self, pattern, boundary):
-        """Bring the copies of the pattern's boundary to another one."""
-        others = self.copies(boundary)[0]
-        for place, v in self.copies(pattern)[0].items():
-            if place in others:
-                others[place].set_value(v.value, skip_validation=True)
-
-    def put(self, pattern, boundary):
-        """Copy the values after ``boundary`` to the boundary of the pattern."""
-        for (b, j), after in self._home.after.items() if self._home is not None else ():
-            if b == boundary:
-                self._home.after[pattern, j].set_value(after.value, skip_validation=True)
+            if element.n in self._home.boundary:
+                self._home.e[jump.name, element.n].set_value(float(jump.name in self._just))
+        return sorted(self._just)

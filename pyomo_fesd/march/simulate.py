@@ -6,35 +6,36 @@ memory, or a jump.  So the march knows nothing of the future, and needs no homot
 Takes: a model on a moving grid whose states at the first time are fixed.
 Leaves: values of everything over time: the solution of a system without freedom (lengths are not equalised), or a start for
 ``mpec_hybrid`` with ``warm_start=True``.
-Does not apply: to systems whose equations are not the same in all elements.
+Does not apply: to systems with freedom; inputs have to be given.
 """
 
-from contextlib import contextmanager
+import logging
 
-from pyomo.common.collections import ComponentSet
-from pyomo.common.modeling import unique_component_name
-from pyomo.core import Block, Constraint, Var
-from pyomo.core.expr.visitor import identify_variables
-from pyomo.mpec import Complementarity
+from pyomo.common.collections import ComponentMap, ComponentSet
 
-from pyomo_fesd import marks
-from pyomo_fesd.complementarity import read
 from pyomo_fesd.elements.cross import grid_of
 from pyomo_fesd.elements.jumps import read_jumps
 from pyomo_fesd.elements.memory import read_modes
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.indicators import set_indicators
+from pyomo_fesd.march.accumulation import accumulation
+from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
-from pyomo_fesd.march.window import TRIES, Window, small_model, solver, variables_of
+from pyomo_fesd.march.window import Window
 from pyomo_fesd.records import records
 from pyomo_fesd.review import review
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
-from pyomo_fesd.trajectory import trajectory
+from pyomo_fesd.trajectory import physical_time, trajectory
 
-#: A step shorter than this part of its share is none; one that is longer than the rest has not been cut short.
+logger = logging.getLogger('pyomo_fesd')
+
+#: A step shorter than this part of its share is none.
 NO_STEP = 1e-9
-#: So many intervals between switches, each shorter than the last, are a sign that the switches accumulate.
-SHRINKING = 4
+#: A step that is shorter than its share by more than this part has been cut short by an event.
+CUT = 1e-7
+#: How an element is tried, one after the other: from where the last one ended; from afar; with other starts.  A step of no
+#: length is a local solution of its own where a switch lies on the left boundary, so the later ones look farther.
+TRIES = ({'warm_start': True, 'lpec': 'reduced'}, {'lpec': 'full'}, {'lpec': 'full', 'starts': 6})
 
 
 def simulate(model, wrt=None, inputs=(), **options):
@@ -45,9 +46,9 @@ def simulate(model, wrt=None, inputs=(), **options):
     model : Block
         after ``fesd.finite_elements``; its states are fixed at the first time
     wrt : ContinuousSet, optional
-    inputs : list of Var
-        variables over time that are given: they keep their present values (controls of an optimal control problem, whose guess
-        is simulated)
+    inputs : Var or list of Var
+        variables over time that keep their present values, as a guess of controls; those that are named in
+        ``piecewise_constant`` need not be named again
     options : options of ``mpec_hybrid`` for the small problem of each element
 
     Returns
@@ -58,17 +59,27 @@ def simulate(model, wrt=None, inputs=(), **options):
     ------
     FesdError
         where the march cannot go on: more switches than elements (with the time at which they accumulate, if they do), a state
-        that is not fixed at the first time, equations that differ from element to element
+        that is not fixed at the first time, a variable that nothing determines.  The model has the values up to there.
     """
     wrt = find_continuous_set(model, wrt, 'simulate')
     if wrt not in records(model).grids:
         raise FesdError(wrt, "simulate: its elements are not movable", "apply fesd.finite_elements first")
-    march = March(model, wrt, inputs, options)
-    with march.given():
-        march.run()
-    set_indicators(model)
-    review(model)
-    return trajectory(model, wrt)
+    inputs = list(inputs) if isinstance(inputs, (list, tuple)) else [inputs]
+    ends = _fixed_later(model, wrt)
+    try:
+        March(model, wrt, inputs, options).run()
+        set_indicators(model)
+        review(model)
+        return trajectory(model, wrt)
+    finally:
+        for v, given in ends.items():
+            v.set_value(given, skip_validation=True)
+
+
+def _fixed_later(model, wrt):
+    """States that are fixed after the first time, as at the end of a control problem, with their values."""
+    times, states = TimeIndex(wrt), [d.get_state_var() for d in derivatives(model, wrt)]
+    return ComponentMap((v, v.value) for x in states for v in x.values() if v.fixed and times.time(v) != wrt.first())
 
 
 class March:
@@ -76,200 +87,178 @@ class March:
 
     def __init__(self, model, wrt, inputs, options):
         self._model, self._wrt, self._options = model, wrt, options
-        self._block = records(model).grids[wrt]
-        self._grid, self._times = grid_of(self._block), TimeIndex(wrt)
-        self._pattern = self._grid.elements[min(1, len(self._grid.elements) - 1)]
-        self._states = ComponentSet(d.get_state_var() for d in derivatives(model, wrt))
-        modes = read_modes(model, wrt)
-        self._memories = [Memory([m for m in modes if m.system == s]) for s in dict.fromkeys(m.system for m in modes)]
-        self._jumps = Jumps(read_jumps(model, wrt), self._block.component('jumps'))
-        self._given = ComponentSet(v for u in inputs for v in u.values())
-        self._given.update(v for memory in self._memories for v in memory.variables())
-        self._given.update(self._jumps.variables())
+        self._block, self._times = records(model).grids[wrt], TimeIndex(wrt)
+        self._grid = grid_of(self._block)
+        modes, jumps = read_modes(model, wrt), read_jumps(model, wrt)
+        systems = dict.fromkeys(m.system for m in modes)
+        self._memories = [Memory([m for m in modes if m.system == s], self._block.component('memory')) for s in systems]
+        self._jumps = Jumps(jumps, self._block.component('jumps'))
+        self._reader = Reader(model, self._block, self._times, self._given(inputs))
+        self._equations, self._windows = {}, {}
         self._time, self._events = float(wrt.first()), {}
 
-    def run(self):
-        """March through all elements; where those of a stage do not suffice, again with one in reserve for every switch in it."""
-        self._begin()
-        window, reserve = self._window(), dict.fromkeys(self._grid.stages, 0)
-        while True:
-            stage = self._through(window, reserve)
-            if stage is None:
-                return
-            seen = len(self._events[stage])
-            if seen <= reserve[stage] or self._accumulate():
-                raise self._used_up(stage)
-            reserve[stage] = seen
+    def _given(self, inputs):
+        """Inputs, controls that are held on each stage, and weights of modes with memory."""
+        given = ComponentSet(v for u in inputs for v in u.values())
+        for row in self._block.held.values():
+            # the value at the end of its stage counts
+            *others, last = sorted(variables_of([row.body]), key=self._times.time)
+            given.update((*others, last))
+            for control in others:
+                control.set_value(last.value, skip_validation=True)
+        given.update(v for memory in self._memories for e in self._grid.elements for v in memory.variables(e.right))
+        return given
 
-    def _through(self, window, reserve):
-        """March once; returns the stage whose elements were used up before its end, None if all went well.
+    def run(self):
+        """March through all elements; where their number does not fit the switches of a stage, again with one for each of them."""
+        self._begin()
+        reserve, tried = dict.fromkeys(self._grid.stages, 0), set()
+        while True:
+            stage = self._through(reserve)
+            if stage is None:
+                return self._warn_short()
+            reserve[stage] = self._expected(stage)
+            if tuple(reserve.values()) in tried:
+                raise self._used_up(stage)
+            tried.add(tuple(reserve.values()))
+
+    def _expected(self, stage):
+        """The switches to expect in a stage whose elements did not fit; all of them are for switches if these accumulate there."""
+        elements, limit = self._grid.stages[stage], accumulation(self._events[stage])
+        short = limit is not None and limit[1] <= elements[-1].right
+        return len(elements) - 1 if short else len(self._events[stage])
+
+    def _begin(self):
+        """The algebraic variables and the modes at the first time."""
+        first = self._wrt.first()
+        states = [d.get_state_var() for d in derivatives(self._model, self._wrt)]
+        free = next((v for x in states for v in x.values() if self._times.time(v) == first and not v.fixed), None)
+        if free is not None:
+            raise FesdError(free, "simulate: this state is not fixed at the first time", "fix its initial value")
+        for memory in self._memories:
+            memory.begin(first)
+            memory.set_weights(self._grid.elements[0])
+        equations = self._reader.first(first)
+        if equations.unknown:
+            window = Window(equations, self._options, steps=False)
+            self._require(window.solve(equations))
+            window.put_out(equations)
+
+    def _through(self, reserve):
+        """March once; returns the stage whose elements do not fit, None if all went well.
 
         Parameters
         ----------
         reserve : dict stage -> number of switches to be expected
         """
         self._time, self._events = float(self._wrt.first()), {stage: [] for stage in reserve}
+        self._jumps.begin()
         for memory in self._memories:
             memory.begin(self._wrt.first())
-        cut, kept = True, None
+        warm = False
         for stage, elements in self._grid.stages.items():
             rest = sum(e.length for e in elements)
             for number, element in enumerate(elements):
                 left, expected = len(elements) - number, max(0, reserve[stage] - len(self._events[stage]))
                 share = rest / max(1, left - expected)
-                h = self._advance(window, element, share, not cut)
-                cut = h < share * (1 - NO_STEP)
+                h, happened = self._advance(element, share, warm)
+                cut = h < share * (1 - CUT)
+                # after a switch another active set holds
+                warm = bool(happened) or not cut
                 rest, self._time = rest - h, self._time + h
-                if self._end(element, cut):
-                    self._events[stage].append(self._time)
-                if element is self._pattern:
-                    kept = window.values()
-                if (rest <= NO_STEP * share) != (left == 1):
+                if cut or happened:
+                    self._events[stage].append((self._time, ', '.join(happened) or 'switch'))
+                if (rest <= CUT * share) != (left == 1):
                     return stage
-        window.put_back(kept)
         for memory in self._memories:
-            memory.settle(self._block.memory, self._grid, self._wrt.first())
+            memory.settle(self._grid, self._wrt.first())
         return None
 
-    def _labels(self, element):
-        return tuple(dict.fromkeys((element.left, *element.points, element.right)))
-
-    def _begin(self):
-        """The algebraic variables and the modes at the first time."""
-        first = self._wrt.first()
+    def _advance(self, element, share, warm):
+        """One element of at most the length ``share``; returns its length and what happens at its end."""
         for memory in self._memories:
-            memory.begin(first)
-            memory.set_weights([first])
-        rows = [c.expr for c in self._equations([first])]
-        conditions = self._model.component_data_objects(Complementarity, active=True, descend_into=Block)
-        pairs = [read(c) for c in conditions if self._times.time(c) == first]
-        everything = variables_of([*rows, *(side for pair in pairs for side in pair)])
-        unknown = ComponentSet(v for v in everything if self._times.time(v) == first and not v.fixed and v not in self._given)
-        free = next((v for v in unknown if v.parent_component() in self._states), None)
-        if free is not None:
-            raise FesdError(free, "this state is not fixed at the first time", "fix its initial value before simulate")
-        model = small_model(self._home('first'), rows, pairs, unknown)
-        for v in everything:
-            if v not in unknown:
-                v.fix()
-        if unknown:
-            self._require(solver(self._options).solve(model))
+            memory.set_weights(element)
+        h, last = self._step(element, share, warm), len(own_labels(element))
+        while True:
+            arrived = [(memory, memory.arrived(element)) for memory in self._memories]
+            jumped = self._jumps.arrived(element)
+            places = [p for found in (jumped, *(found for _, found in arrived)) for p in found if p is not None]
+            if min(places, default=last) == last:
+                break
+            # a stage point is there already: the element ends where that point was
+            h = self._step(element, h * self._grid.tau[min(places) - 1], True)
+        if element is self._grid.elements[-1]:
+            return h, []
+        happened = self._jumps.end(element, jumped)
+        for memory, found in arrived:
+            if last in found:
+                memory.end(element.right)
+                happened.append(memory.name)
+        return h, happened
 
-    def _equations(self, labels, counts=None):
-        """Active equations at ``labels``, and what the package adds there; user inequalities do not determine a simulation."""
-        memory = self._block.component('memory')
-        for c in self._model.component_data_objects(Constraint, active=True, descend_into=Block):
-            label = self._times.time(c)
-            if label in labels and (c.equality or marks.is_generated(c)) and c.parent_block() is not memory:
-                yield c
-
-    def _signs(self, labels):
-        """Signs of sides and values at left limits, which stand in lists: those of variables at ``labels`` only."""
-        for name in ('nonnegative', 'left_limit'):
-            rows = self._block.component(name)
-            for c in rows.values() if rows is not None else ():
-                found = {self._times.time(v) for v in identify_variables(c.body, include_fixed=True)}
-                if found <= set(labels) and found & set(labels[1:]):
-                    yield c
-
-    def _window(self):
-        labels, n = self._labels(self._pattern), self._pattern.n
-        rows = [c.expr for c in self._equations(labels[1:])] + [c.expr for c in self._signs(labels)]
-        for label in labels[1:]:
-            rows += [row for memory in self._memories for row in memory.rows(label)] + self._jumps.rows(label)
-        copies, more = self._jumps.copies(n - 1)
-        rows += more
-        pairs = [read(c) for index, c in self._block.cross.items() if index[1] == n]
-        return Window(
-            self._home('pattern'), self._block.r[n], labels, rows, pairs, copies.values(), self._given, self._times, self._options
-        )
-
-    def _home(self, name):
-        self._scratch.add_component(name, Block())
-        return self._scratch.component(name)
-
-    def _advance(self, window, element, share, warm):
-        """One element of at most the length ``share``; returns its length."""
-        labels = self._labels(element)
-        for memory in self._memories:
-            memory.set_weights(labels[1:])
-        if element.n == 1:
-            self._jumps.stay(self._pattern.n - 1, element.left, self._times)
-        else:
-            self._jumps.put(self._pattern.n - 1, element.n - 1)
+    def _step(self, element, most, warm):
+        """Solve one element with a length of at most ``most``; returns its length."""
+        equations = self._problem(element)
+        if equations.kind not in self._windows:
+            self._windows[equations.kind] = Window(equations, self._options), element.length
+        window, nominal = self._windows[equations.kind]
         for options in TRIES[not warm :]:
-            r, results = window.solve(labels, share / self._pattern.length, options)
-            h = r * self._pattern.length
-            if results.solver.stationarity == 'B' and h > NO_STEP * share:
-                self._jumps.take(self._pattern.n - 1, element.n - 1)
+            results = window.solve(equations, most / nominal, **options)
+            h = window.length * nominal
+            if results.solver.stationarity == 'B' and h > NO_STEP * most:
+                h = most if h > most * (1 - CUT) else h
+                window.put_out(equations)
                 self._block.r[element.n].set_value(h / element.length, skip_validation=True)
                 return h
         self._require(results)
-        raise FesdError(
-            self._wrt,
-            f"simulate: no step is possible from time {self._time:.6g}",
+        raise self._stuck(
+            f"no step is possible from time {self._time:.6g}",
             "look for a bound that the solution reaches there, or for a state from which no mode leads on",
         )
 
+    def _problem(self, element):
+        if element.n not in self._equations:
+            limits = [row for memory in self._memories for row in memory.limits(element)]
+            self._equations[element.n] = self._reader.element(element, [*limits, *self._jumps.limits(element)])
+        return self._equations[element.n]
+
+    def _warn_short(self):
+        """Where less time lies between two switches than an element must have, the full problem has no solution like this one."""
+        for stage, elements in self._grid.stages.items():
+            begin = physical_time(self._model, self._wrt)[elements[0].left]
+            ends = [*(time for time, _ in self._events[stage]), begin + sum(e.length * self._block.r[e.n].value for e in elements)]
+            least = min(e.length * (self._block.r[e.n].lb or 0.0) for e in elements)
+            for a, b in zip([begin, *ends], ends):
+                if 0 < b - a < least * (1 - CUT):
+                    logger.warning(
+                        "simulate: from time %.6g to %.6g there is less time between two switches than the least element length "
+                        "%.3g, so mpec_hybrid will not find this solution. Take more elements (nfe) or a larger length_bounds.",
+                        a,
+                        b,
+                        least,
+                    )
+
     def _require(self, results):
         if results.solver.stationarity != 'B':
-            raise FesdError(
-                self._wrt,
-                f"simulate: no solution at time {self._time:.6g}: {results.solver.reason}",
+            raise self._stuck(
+                f"no solution at time {self._time:.6g}: {results.solver.reason}",
                 "check the equations there; more elements help where the solution is steep",
             )
 
-    def _end(self, element, limited):
-        """Let modes end and states jump at the right boundary of ``element``; returns whether anything happens there."""
-        ended = [memory.end(element.right) for memory in self._memories]
-        jumped = self._jumps.end(element.n, element.right, limited)
-        return limited or jumped or any(ended)
-
-    def _accumulate(self):
-        """The time at which the switches accumulate, None if their intervals do not shrink."""
-        events = [t for stage in self._events.values() for t in stage]
-        gaps = [b - a for a, b in zip(events, events[1:])][-SHRINKING:]
-        ratios = [b / a for a, b in zip(gaps, gaps[1:])]
-        if len(gaps) < SHRINKING or max(ratios) > 0.95:
-            return None
-        return events[-1] + gaps[-1] * ratios[-1] / (1 - ratios[-1])
+    def _stuck(self, cause, fix):
+        """The error of a march that cannot go on; a limit of shrinking intervals explains most."""
+        events = [event for stage in self._events.values() for event in stage]
+        limit = accumulation(events)
+        if limit is not None:
+            times = ', '.join(f'{t:.9g}' for t in limit[0])
+            cause = f"the switches accumulate (Zeno): the last ones are at times {times}, their limit is about {limit[1]:.6g}"
+            fix = "no number of elements reaches beyond: end before, or model what happens there (a rest, a slide)"
+        return FesdError(self._wrt, f"simulate: {cause}", fix)
 
     def _used_up(self, stage):
         """More switches than elements."""
-        events, limit = [t for times in self._events.values() for t in times], self._accumulate()
-        if limit is not None:
-            return FesdError(
-                self._wrt,
-                "simulate: the switches accumulate (Zeno): the last ones are at times "
-                f"{', '.join(f'{t:.6g}' for t in events[-SHRINKING:])}, their limit is about {limit:.6g}",
-                "no number of elements reaches beyond: end before, or model what happens there (a rest, a slide)",
-            )
-        return FesdError(
-            self._wrt,
-            f"simulate: the elements of control stage {stage} are used up at time {self._time:.6g}, after {len(events)} switches",
+        number = sum(map(len, self._events.values()))
+        return self._stuck(
+            f"the elements of control stage {stage} are used up at time {self._time:.6g}, after {number} switches",
             "take more elements (nfe)",
         )
-
-    @contextmanager
-    def given(self):
-        """Fix and release as the march needs it; afterwards everything is as free as it was."""
-        variables = [(v, v.fixed) for v in self._model.component_data_objects(ctype=Var, descend_into=Block)]
-        r = self._block.r[self._pattern.n]
-        # a simulation goes where the equations lead: bounds of states are for those who choose inputs
-        states = [v for v, _ in variables if v.parent_component() in self._states]
-        bounds, held = [(v, v.lower, v.upper) for v in (r, *states)], r.fixed
-        for v in states:
-            v.bounds = (None, None)
-        r.unfix()
-        r.setlb(0)
-        self._scratch = Block()
-        self._model.add_component(unique_component_name(self._model, marks.GENERATED + 'march'), self._scratch)
-        try:
-            yield
-        finally:
-            self._model.del_component(self._scratch)
-            for v, fixed in variables:
-                v.fixed = fixed
-            for v, lower, upper in bounds:
-                v.bounds = (lower, upper)
-            r.fixed = held
