@@ -11,9 +11,17 @@ CONTINUOUS         Var                       the Constraint (of lam, mu, p, n), 
                                              the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
 INDICATOR          Disjunct                  the expression of its multiplier nu_i (1: mode on, 0: off, between: sliding)
+REPLACED           Disjunct,                 ``True``: switched off by logic between modes and not by the user, so new times of
+                   LogicalConstraint (data)  it are not switched off too
 SIDES              Var                       (name, {side: expression}) of the surface that it belongs to: positive where the
                                              quantity is on this side
+MEMORY             Expression (data)         the conditions c >= 0 of a mode with memory; the Expression is its weight, 1 or 0 in an
+                                             element; the mode goes on until a condition ends
+GUARD              Expression (data)         ``True``: a jump of the state happens where this falls to 0 from above
+RESET              Var (data)                the Expression of the value after the jump whose guard stands on the same block
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
+MOVE               Complementarity (data)    another pair whose zero side it may take over; all on one block do so together
+                   Var (data)                where the move starts it; ``True``: worth a look only where it is at its lower bound
 ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
                                              certificate looks beyond them
 PENALTY            Expression                its weight rho; guides the homotopy, never part of the reported objective
@@ -25,8 +33,13 @@ from pyomo.core import Block, Suffix
 CONTINUOUS = 'fesd_continuous'
 SELECTOR = 'fesd_selector'
 INDICATOR = 'fesd_indicator'
+MEMORY = 'fesd_memory'
+GUARD = 'fesd_guard'
+RESET = 'fesd_reset'
 SIDES = 'fesd_sides'
+REPLACED = 'fesd_replaced'
 DECIDED = 'fesd_decided'
+MOVE = 'fesd_move'
 ARTIFICIAL = 'fesd_artificial'
 PENALTY = 'fesd_penalty'
 
@@ -43,11 +56,22 @@ def mark(block, name, component, value=True):
     suffix.set_value(component, value, expand=False)
 
 
-def marked(block, name):
+def suffixes(block, name, used=False):
+    """The Suffixes that hold mark ``name`` on ``block`` and the active blocks below it; with ``used`` also those used up."""
+    active = None if used else True
+    return (s for s in block.component_objects(Suffix, active=active, descend_into=Block) if s.local_name == name)
+
+
+def marked(block, name, used=False):
     """All ``(component, value)`` marked ``name`` on ``block`` and the active blocks below it."""
-    for suffix in block.component_objects(Suffix, active=True, descend_into=Block):
-        if suffix.local_name == name:
-            yield from suffix.items()
+    for suffix in suffixes(block, name, used):
+        yield from suffix.items()
+
+
+def use_up(block, name):
+    """What mark ``name`` asks for has been done: ``marked`` does not find it any more."""
+    for suffix in list(suffixes(block, name)):
+        suffix.deactivate()
 
 
 def is_generated(component):

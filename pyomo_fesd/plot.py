@@ -5,8 +5,9 @@ from matplotlib.figure import Figure
 
 from pyomo_fesd.elements.grid import read_grid
 from pyomo_fesd.errors import FesdError
+from pyomo_fesd.marks import is_generated
 from pyomo_fesd.timeindex import derivatives, find_continuous_set
-from pyomo_fesd.trajectory import element_lengths, switches, trajectory
+from pyomo_fesd.trajectory import element_lengths, row_of_label, switches, trajectory
 
 
 def plot(model, wrt=None, names=None, units=None):
@@ -39,7 +40,7 @@ def plot(model, wrt=None, names=None, units=None):
     axes = np.atleast_1d(figure.subplots(len(groups), 1, sharex=True))
     for axis, (name, columns) in zip(axes, groups):
         for column in columns:
-            _draw(axis, frame, column, wrt)
+            _draw(axis, frame, column, model, wrt)
         axis.set_ylabel((units or {}).get(name, name))
         if len(columns) > 1:
             axis.legend(fontsize='small')
@@ -54,7 +55,7 @@ def plot(model, wrt=None, names=None, units=None):
 
 def _states_and_multipliers(model, wrt, frame):
     """Names of the differential states, and of the Disjunctions that have multipliers."""
-    states = dict.fromkeys(d.get_state_var().name for d in derivatives(model, wrt))
+    states = dict.fromkeys(d.get_state_var().name for d in derivatives(model, wrt) if not is_generated(d))
     disjunctions = dict.fromkeys(c.split(': ')[0] for c in frame.columns if ': ' in c)
     return [*states, *disjunctions]
 
@@ -66,13 +67,13 @@ def _columns(frame, name):
     return found
 
 
-def _draw(axis, frame, column, wrt):
+def _draw(axis, frame, column, model, wrt):
     """States as lines through all points; multipliers element by element, as they jump at boundaries."""
     label = column.split(': ')[-1]
     if ': ' not in column:
         axis.plot(frame.index, frame[column], '.-', markersize=3, linewidth=1.2, label=label)
         return
-    color, row = axis._get_lines.get_next_color(), {t: k for k, t in enumerate(wrt)}
+    color, row = axis._get_lines.get_next_color(), row_of_label(model, wrt)
     for k, element in enumerate(read_grid(wrt, [wrt.first(), wrt.last()]).elements):
         inside = [row[t] for t in dict.fromkeys((*element.points, element.right))]
         values = frame[column].iloc[[inside[0], *inside]]

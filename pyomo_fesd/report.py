@@ -4,11 +4,12 @@ import pandas as pd
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint, Objective
 from pyomo.core.expr.visitor import identify_variables
-from pyomo.gdp import Disjunction
+from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
 from pyomo_fesd.complementarity import Mixed, read
+from pyomo_fesd.elements.mixed import replacement
 
 
 class Report(dict):
@@ -29,8 +30,8 @@ def report(model):
         a dict: ``variables`` and ``constraints`` (active, as the solver counts them; multipliers among them in
         ``multipliers``), ``pairs`` (complementarity pairs in the homotopy), ``decided`` (pairs that only the branch decides,
         eq. 13), ``binaries at most`` (one a pair; the LPEC uses one for each bi-active pair), ``sources`` (complementarity
-        conditions over time that the pairs stand for), ``disjunctions`` (transformed) and ``modes left out`` (switched-off
-        disjuncts, which leave no multiplier)
+        conditions over time that the pairs stand for; one between two bounds counts twice), ``disjunctions`` (transformed) and
+        ``modes left out`` (switched-off disjuncts, which leave no multiplier)
     """
     constraints = list(model.component_data_objects(Constraint, active=True, descend_into=Block))
     conditions = list(model.component_data_objects(Complementarity, active=True, descend_into=Block))
@@ -41,7 +42,7 @@ def report(model):
     expressions = [c.body for c in constraints] + [o.expr for o in objectives] + [s for c in conditions for s in c._args]
     variables = ComponentSet(v for e in expressions for v in identify_variables(e, include_fixed=False))
     own = (c for c in model.component_data_objects(Complementarity, descend_into=Block) if not c.active and c not in deciding)
-    disjunctions = [d for d in model.component_data_objects(Disjunction, descend_into=Block) if _transformed(d)]
+    disjunctions = [d for d in model.component_data_objects(Disjunction, descend_into=(Block, Disjunct)) if _transformed(d)]
     return Report(
         {
             # a condition between two bounds becomes two pairs, with the two parts of its function
@@ -51,7 +52,9 @@ def report(model):
             'pairs': len(conditions) - decided + mixed,
             'decided': decided,
             'binaries at most': len(conditions) - decided + mixed,
-            'sources': sum(1 for c in own if getattr(c, '_args', None) is not None and not _is_equilibration(c)),
+            'sources': sum(
+                1 for c in own if getattr(c, '_args', None) is not None and not _is_equilibration(c) and not _is_split(c)
+            ),
             'disjunctions': len(disjunctions),
             'modes left out': sum(1 for d in disjunctions for mode in d.disjuncts if mode.transformation_block is None),
         }
@@ -61,6 +64,11 @@ def report(model):
 def _transformed(disjunction):
     """Whether ``fesd.dcs`` has taken the place of a Disjunction."""
     return not disjunction.active and any(mode.transformation_block is not None for mode in disjunction.disjuncts)
+
+
+def _is_split(condition):
+    """Whether pairs have taken the place of a condition with two bounds on one side."""
+    return not marks.is_generated(condition) and replacement(condition) is not None
 
 
 def _is_equilibration(condition):

@@ -32,6 +32,7 @@ from pyomo_fesd.mpcc.sides import sort_sides
 from pyomo_fesd.mpcc.source import Contradiction
 from pyomo_fesd.mpcc.stationarity import certify as certify_point
 from pyomo_fesd.mpcc.table import StartsTable, Table, log_streams
+from pyomo_fesd.review import review
 
 
 @document_class_CONFIG(methods=['solve'])
@@ -92,7 +93,8 @@ class MpecHybrid(SolverBase):
         Results
             Pyomo's, and in ``extra_info``: ``outcome`` (a sentence), ``stationarity`` ('B' or 'not certified'), ``reason``,
             ``violation``, ``complementarity`` (absolute and ``_scaled``), ``biactive_pairs``, ``nlps``, ``nlp_iterations``,
-            ``lpecs``, ``binaries``, ``eps_last``, ``pairs``, ``missing_values``, ``violated`` (by name), ``steps``, ``starts``
+            ``lpecs``, ``binaries``, ``eps_last``, ``pairs``, ``missing_values``, ``violated`` (by name), ``steps``, ``starts``,
+            ``warnings`` (what ``review`` says of a solution on moving elements)
 
         Raises
         ------
@@ -128,7 +130,7 @@ class MpecHybrid(SolverBase):
                 fill(results, model, solver.solve(), compiled)
             results.timing_info.wall_time = time.perf_counter() - started
             table.end(results)
-        return self._deliver(results, config)
+        return self._deliver(results, config, model)
 
     def _ready(self, model, config):
         """The model compiled, now, or by ``set_instance`` and up to date, and its sides sorted."""
@@ -160,12 +162,14 @@ class MpecHybrid(SolverBase):
         return config
 
     @staticmethod
-    def _deliver(results, config):
+    def _deliver(results, config, model):
         optimal = results.solution_status is SolutionStatus.optimal
         if config.raise_exception_on_nonoptimal_result and not optimal:
             raise NoOptimalSolutionError(f"mpec_hybrid: {results.extra_info.outcome}. {results.extra_info.reason}")
         if config.load_solutions and results.solution_loader.get_number_of_solutions():
             results.solution_loader.load_solution()
+            feasible = results.solution_status in (SolutionStatus.optimal, SolutionStatus.feasible)
+            results.extra_info.warnings = review(model) if feasible else []
         return results
 
 

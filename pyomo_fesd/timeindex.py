@@ -75,6 +75,21 @@ class TimeIndex:
             data = data.parent_block()
         return None
 
+    def at(self, data, label):
+        """The counterpart of ``data`` at another time; None if ``data`` has no time."""
+        component = data.parent_component()
+        position = self._position(component)
+        if position is not None:
+            index = data.index() if isinstance(data.index(), tuple) else (data.index(),)
+            index = (*index[:position], label, *index[position + 1 :])
+            return component[index if len(index) > 1 else index[0]]
+        home = data.parent_block()
+        other = None if home is None or home.parent_block() is None else self.at(home, label)
+        if other is None:
+            return None
+        found = other.component(component.local_name)
+        return found[data.index()] if component.is_indexed() else found
+
     def families(self, datas):
         """Group ``datas`` by name: ``{"unit[a].hyb[*].dj": {time label: data}}``; data without time are left out."""
         groups = defaultdict(dict)

@@ -4,21 +4,19 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Expression, Var, value
-from pyomo.gdp import Disjunction
-from pyomo.mpec import Complementarity
+from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import marks
-from pyomo_fesd.complementarity import Mixed, read
-from pyomo_fesd.elements.cross import sources
+from pyomo_fesd.conditions import conditions, positions, positive
 from pyomo_fesd.elements.grid import ONE_ELEMENT_SCHEMES, read_grid
+from pyomo_fesd.elements.jumps import jumping_states, read_jumps
+from pyomo_fesd.elements.lengths import duration
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.records import records
-from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set, strip_time
-
-#: A multiplier nearer than this to 0 (or to 1) counts as off (or on).
-CLEAR = 1e-6
+from pyomo_fesd.timeindex import TimeIndex, derivatives, discretised, find_continuous_set, strip_time
+from pyomo_fesd.values import number
 
 
 class Switch(NamedTuple):
@@ -46,7 +44,8 @@ def physical_time(model, wrt=None):
     """Physical time of every label of ``wrt``.
 
     With element lengths h_n a label of element n stands for t_{n,0} + c_r h_n, t_{n,0} the sum of the lengths before
-    (theory, eq. 9 and 10); on an ordinary grid labels are physical time.
+    (theory, eq. 9 and 10), in the time of the plant if the final time or the lengths of the stages are free; on an ordinary
+    grid labels are physical time.
 
     Returns
     -------
@@ -59,7 +58,7 @@ def physical_time(model, wrt=None):
     grid = _grid(wrt)
     time = {wrt.first(): float(wrt.first())}
     for element in grid.elements:
-        left, h = time[element.left], element.length * value(block.r[element.n])
+        left, h = time[element.left], value(duration(block, element))
         time.update((label, left + c * h) for label, c in zip(element.points, grid.tau))
         time[element.right] = left + h
     return {t: time[t] for t in wrt}
@@ -89,8 +88,9 @@ def trajectory(model, wrt=None):
     """Every variable and named expression over time on physical time.
 
     They are named without their time index (``x``, ``unit.F[a]``); each Disjunction adds the multipliers of its modes
-    (``sgn: below``), 1 where the mode is active, 0 where it is not, between in a sliding mode.  The columns ``element`` and
-    ``label`` tell where a row comes from.
+    (``sgn: below``), 1 where the mode is active, 0 where it is not, between in a sliding mode; each condition with two bounds on
+    one side adds where it stands (``valve: at lower bound``, ``valve: between``, ``valve: at upper bound``) in the same way.  The
+    columns ``element`` and ``label`` tell where a row comes from.
 
     Returns
     -------
@@ -102,26 +102,63 @@ def trajectory(model, wrt=None):
     found = model.component_objects((Var, Expression), descend_into=Block)
     owned = (v for v in found if not v.is_reference() and not marks.is_generated(v))
     families = index.families(data for v in owned for data in v.values())
-    columns = {'label': list(times), 'element': _elements(wrt, times)}
+    elements = _elements(wrt, times)
+    columns = {'label': list(times), 'element': elements}
     for name, values in families.items():
-        columns[strip_time(name)] = [_number(values.get(t)) for t in times]
-    for name, modes in _multipliers(model, index).items():
+        columns[strip_time(name)] = [number(values.get(t)) for t in times]
+    inside = _grid(wrt).elements if _has_elements(wrt) else ()
+    for name, modes in (_multipliers(model, index) | positions(model, wrt, index, inside)).items():
         for mode, weights in modes.items():
-            columns[f'{name}: {mode}'] = [_number(weights.get(t)) for t in times]
-    return pd.DataFrame(columns, index=pd.Index(times.values(), name='time'))
+            columns[f'{name}: {mode}'] = [number(weights.get(t)) for t in times]
+    frame = pd.DataFrame(columns, index=pd.Index(times.values(), name='time'))
+    return _with_values_after(frame, model, wrt)
 
 
-def _number(expr):
-    try:
-        result = None if expr is None else value(expr, exception=False)
-    except (ArithmeticError, ValueError, NotImplementedError):
-        # Pyomo cannot evaluate a PiecewiseLinearFunction
-        result = None
-    return np.nan if result is None or isinstance(result, complex) else result
+def _with_values_after(frame, model, wrt):
+    """A second row, for the states only, where a state jumps: the values after it."""
+    states = {strip_time(TimeIndex(wrt).split(x)[1]) for d in derivatives(model, wrt) for x in d.get_state_var().values()}
+    rows, place_of = [], {t: k for k, t in enumerate(wrt)}
+    for element, label, _, values in jumps_that_happen(model, wrt):
+        place = place_of[label]
+        row = frame.iloc[[place]].copy()
+        row.loc[:, [c for c in frame.columns if c not in states | {'label', 'element'}]] = np.nan
+        row['element'] = element.n + 1
+        for x, after in values:
+            row[strip_time(TimeIndex(wrt).split(x)[1])] = after
+        rows.append((place, row))
+    for place, row in reversed(rows):
+        frame = pd.concat([frame.iloc[: place + 1], row, frame.iloc[place + 1 :]])
+    return frame
+
+
+def row_of_label(model, wrt):
+    """Where the row of each label stands in ``trajectory``; a jump has a second row after its own."""
+    second, row, rows = {label for _, label, _, _ in jumps_that_happen(model, wrt)}, 0, {}
+    for label in wrt:
+        rows[label] = row
+        row += 2 if label in second else 1
+    return rows
+
+
+def jumps_that_happen(model, wrt):
+    """``(element before, its right label, name, [(VarData, value after)])`` of every state jump, in order of time."""
+    block = records(model).grids.get(wrt)
+    home = None if block is None else block.component('jumps')
+    jumps = [] if home is None else read_jumps(model, wrt)
+    for element in _grid(wrt).elements[:-1] if jumps else ():
+        names = [j.name for j in jumps if (home.e[j.name, element.n].value or 0.0) > 0.5]
+        if names:
+            states = jumping_states(jumps, element.right)
+            after = [(x, home.after[element.n, j].value) for j, x in enumerate(states, start=1)]
+            yield element, element.right, ', '.join(names), after
+
+
+def _has_elements(wrt):
+    return discretised(wrt) and wrt.get_discretization_info()['scheme'] in ONE_ELEMENT_SCHEMES
 
 
 def _elements(wrt, times):
-    if not discretised(wrt) or wrt.get_discretization_info()['scheme'] not in ONE_ELEMENT_SCHEMES:
+    if not _has_elements(wrt):
         return [0] * len(times)
     owner = _grid(wrt).element_of()
     return [owner[t].n if t in owner else 1 for t in times]
@@ -131,7 +168,7 @@ def _multipliers(model, index):
     """``{disjunction: {mode: {label: expression}}}`` of every Disjunction over time that ``fesd.dcs`` transformed."""
     weights = ComponentMap(marks.marked(model, marks.INDICATOR))
     found = {}
-    for name, family in index.families(model.component_data_objects(Disjunction, descend_into=Block)).items():
+    for name, family in index.families(model.component_data_objects(Disjunction, descend_into=(Block, Disjunct))).items():
         modes = {}
         for t, disjunction in family.items():
             for i, disjunct in enumerate(disjunction.disjuncts, start=1):
@@ -163,7 +200,7 @@ def switches(model, wrt=None):
     wrt = find_continuous_set(model, wrt, 'switches')
     grid, index, found = _grid(wrt), TimeIndex(wrt), Switches()
     times = physical_time(model, wrt)
-    systems = _multipliers(model, index) | _conditions(model, wrt, index) | _surfaces(model, index)
+    systems = _multipliers(model, index) | conditions(model, wrt, index) | _surfaces(model, index)
     for name, modes in systems.items():
         before = None
         for element in grid.elements:
@@ -173,16 +210,19 @@ def switches(model, wrt=None):
             if before is not None and active != before:
                 found.append(Switch(times[element.left], name, before, active))
             before = active
+    for _, label, name, values in jumps_that_happen(model, wrt):
+        sides = [', '.join(f'{strip_time(index.split(x)[1])} = {v:.6g}' for x, v in both) for both in _both_sides(values)]
+        found.append(Switch(times[label], name, *sides))
     return Switches(sorted(found, key=lambda s: s.time))
+
+
+def _both_sides(values):
+    return [(x, value(x)) for x, _ in values], values
 
 
 def _active(modes, element):
     """The mode with a positive multiplier inside an element; several slide; None where nothing tells."""
-    on = [
-        mode
-        for mode, weights in modes.items()
-        if any(t in weights and value(weights[t]) > CLEAR for t in element.points)
-    ]
+    on = positive(modes, element.points) or positive(modes, (element.left,))
     if not on:
         return None
     return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on)
@@ -194,23 +234,4 @@ def _surfaces(model, index):
     for v, (name, sides) in marks.marked(model, marks.SIDES):
         for side, weight in sides.items():
             found.setdefault(name, {}).setdefault(side, {})[index.time(v)] = weight
-    return found
-
-
-def _conditions(model, wrt, index):
-    """Hand-written complementarities as systems of two modes, named by the side that is positive.
-
-    Those that ``fesd.finite_elements`` has aggregated are inactive but at the first time; others that are inactive are off.
-    """
-    own = (c for c in model.component_data_objects(Complementarity, descend_into=Block) if not marks.is_generated(c))
-    block, found = records(model).grids.get(wrt), {}
-    moved = ComponentSet(c for conditions in sources(block).values() for c in conditions) if block is not None else ()
-    for name, family in index.families(own).items():
-        in_use = any(c.active or c in moved for c in family.values())
-        sides = {t: read(c) for t, c in family.items() if block is not None or c.active}
-        if in_use and not any(isinstance(s, Mixed) for s in sides.values()):
-            found[strip_time(name)] = {
-                'G > 0': {t: pair.G for t, pair in sides.items()},
-                'H > 0': {t: pair.H for t, pair in sides.items()},
-            }
     return found

@@ -3,10 +3,12 @@
 Rules ask their component for the model (``d.model()``), so that clones can be discretised too.
 """
 
+import itertools
 import random
 
 import pyomo.environ as pyo
 from pyomo import dae
+from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
@@ -299,22 +301,49 @@ def form_of(disjunction):
     return block, () if index is None else index if isinstance(index, tuple) else (index,)
 
 
-def put_on(disjunction, pair):
-    """Set the multipliers as eq. (3) or (5) ask at the present states, with nu = 1 on region number ``pair``."""
+def corners(disjunction):
+    """The corners of the set that the jumping multipliers range over: a list of {variable: value}."""
+    block, index = form_of(disjunction)
+    if block.component('alpha') is not None:
+        alpha = [block.alpha[(*index, k)] for k in block.functions]
+        return [ComponentMap(zip(alpha, bits)) for bits in itertools.product((1.0, 0.0), repeat=len(alpha))]
+    if block.component('mu') is None:
+        return [ComponentMap([(block.nu[index or None], value)]) for value in (1.0, 0.0)]
+    return [ComponentMap((block.nu[(*index, k)], float(k == on)) for k in block.regions) for on in block.regions]
+
+
+def put_on(disjunction, number):
+    """Set the multipliers as eq. (3), (5) or (6) ask at the present states, the jumping ones at corner ``number`` (from 1)."""
+    for v, value in corners(disjunction)[number - 1].items():
+        v.value = value
     block, index = form_of(disjunction)
     now = index or None
     if block.component('mu') is None:
-        block.n[now].value = 0
-        c = solution(block.switching[now], block.p[now])
-        block.p[now].value, block.n[now].value = max(c, 0), max(-c, 0)
-        block.nu[now].value = 2 - pair
+        for key in [now] if block.component('alpha') is None else [(*index, k) for k in block.functions]:
+            block.n[key].value = 0
+            c = solution(block.switching[key], block.p[key])
+            block.p[key].value, block.n[key].value = max(c, 0), max(-c, 0)
         return
     block.mu[now].value = 0
     g = {k: solution(block.stationarity[(*index, k)], block.lam[(*index, k)]) for k in block.regions}
     block.mu[now].value = min(g.values())
     for k in block.regions:
         block.lam[(*index, k)].value = g[k] - min(g.values())
-        block.nu[(*index, k)].value = float(k == pair)
+
+
+def turn_on(disjunction, disjunct):
+    """Put the multipliers at a corner at which ``disjunct`` alone is on; some corners of eq. (6) belong to no state."""
+    for number in range(1, 1 + len(corners(disjunction))):
+        put_on(disjunction, number)
+        on = [d for d, weight in weights(disjunction).items() if pyo.value(weight) == 1]
+        if len(on) == 1 and on[0] is disjunct:
+            return
+    raise AssertionError(f'{disjunct.name} is never on alone')
+
+
+def weights(disjunction):
+    """The multiplier of each disjunct."""
+    return pyo.TransformationFactory('fesd.dcs').get_multipliers(disjunction)
 
 
 def violation(disjunction):
@@ -339,18 +368,15 @@ def _starts(key, index):
 
 def modes_on(disjunction, tolerance=1e-7):
     """The disjuncts whose multiplier may be 1 at the present states; the multipliers are left at the last of them."""
-    block, index = form_of(disjunction)
-    source = pyo.TransformationFactory('fesd.dcs').get_src_disjunct
-    count = sum(_starts(key, index) for key in block.complementarity)
-    allowed = []
-    for pair in range(1, count + 1):
-        put_on(disjunction, pair)
+    allowed, on = None, ComponentSet()
+    for number in range(1, 1 + len(corners(disjunction))):
+        put_on(disjunction, number)
         if violation(disjunction) <= tolerance:
-            allowed.append(pair)
+            allowed = number
+            on.update(d for d, weight in weights(disjunction).items() if pyo.value(weight) == 1)
     if allowed:
-        put_on(disjunction, allowed[-1])
-    owners = [source(block.complementarity[(*index, pair)]) for pair in allowed]
-    return [d for d in disjunction.disjuncts if any(d is owner for owner in owners)]
+        put_on(disjunction, allowed)
+    return [d for d in disjunction.disjuncts if d in on]
 
 
 def rate(disjunction, v):

@@ -8,7 +8,7 @@ import pytest
 import pyomo_fesd
 
 PACKAGE = Path(pyomo_fesd.__file__).parent
-ROOMS = ('dcs', 'elements', 'mpcc')
+ROOMS = ('dcs', 'elements', 'kinks', 'mpcc')
 
 
 def imports(path):
@@ -34,11 +34,20 @@ def test_only_the_solver_imports_mpcc():
 def test_public_names():
     assert sorted(pyomo_fesd.__all__) == [
         'FesdError',
+        'absolute',
         'certify',
+        'clip',
+        'clock',
         'element_lengths',
+        'maximum',
+        'minimum',
         'physical_time',
         'plot',
+        'positive_part',
+        'projection',
         'report',
+        'simulate',
+        'state_jump',
         'switches',
         'trajectory',
     ]

@@ -18,6 +18,10 @@ def m():
     m.p, m.q = pyo.Var(bounds=(0, None), initialize=2), pyo.Var(bounds=(0, None), initialize=5)
     m.u = pyo.Var(bounds=(None, 4), initialize=1)
     m.b = pyo.Var(bounds=(1, 4), initialize=2)
+    m.v, m.w = pyo.Var(bounds=(0, 1), initialize=0.5), pyo.Var(bounds=(0, 9), initialize=3)
+    m.r = pyo.Var(bounds=(-100, 100), initialize=3)
+    m.half = pyo.Var(bounds=(0, float('inf')), initialize=3)
+    m.d = pyo.Param(initialize=float('inf'), mutable=True)
     m.c = pyo.Param(initialize=3, mutable=True)
     return m
 
@@ -59,6 +63,15 @@ def pair(m, first, second):
         (lambda m: (m.x >= 0, m.b), 'x', 'b - 1'),
         (lambda m: (m.b, m.x >= 0), 'x', 'b - 1'),
         (lambda m: (pyo.inequality(0, m.x, 1), m.y >= 0), 'y', 'x'),
+        # more bounds than two, where the upper ones make no difference
+        (lambda m: (m.v, m.w), 'v', 'w'),
+        (lambda m: (m.p, m.b), 'p', 'b - 1'),
+        (lambda m: (m.b, m.p), 'b - 1', 'p'),
+        # bounds that are none
+        (lambda m: (m.half, m.x), 'half', 'x'),
+        (lambda m: (pyo.inequality(0, m.x, float('inf')), m.y), 'x', 'y'),
+        (lambda m: (pyo.inequality(0, m.x, m.d), m.y), 'x', 'y'),
+        (lambda m: (pyo.inequality(float('-inf'), m.x, 4), m.y), '4 - x', '- y'),
     ],
 )
 def test_a_condition_as_people_write_it_is_a_pair_of_non_negative_sides(m, write, G, H):
@@ -73,6 +86,10 @@ def test_a_condition_as_people_write_it_is_a_pair_of_non_negative_sides(m, write
         (lambda m: (m.b, m.x + m.y), 1, 'b', 4, 'x + y'),
         (lambda m: (m.x + m.y, m.b), 1, 'b', 4, 'x + y'),
         (lambda m: (pyo.inequality(m.c, m.x, 8), m.y - 1), 3, 'x', 8, 'y - 1'),
+        (lambda m: (m.v, m.x), 0, 'v', 1, 'x'),
+        (lambda m: (pyo.inequality(0, m.v, 1), m.r), 0, 'v', 1, 'r'),
+        (lambda m: (m.r, pyo.inequality(0, m.v, 1)), 0, 'v', 1, 'r'),
+        (lambda m: (m.x <= float('inf'), pyo.inequality(0, m.y, 1)), 0, 'y', 1, 'x'),
     ],
 )
 def test_two_bounds_on_one_side_are_a_mixed_condition(m, write, lower, body, upper, F):
@@ -89,6 +106,10 @@ def test_two_bounds_on_one_side_are_a_mixed_condition(m, write, lower, body, upp
         (lambda m: (m.x, m.y), "'x' and 'y' have 0 finite bounds between them, two are needed"),
         (lambda m: (m.x + 1, m.y), 'have 0 finite bounds'),
         (lambda m: (pyo.inequality(0, m.x, 1), pyo.inequality(0, m.y, 1)), 'have 4 finite bounds'),
+        # which of them is between its bounds, and which has to vanish there?
+        (lambda m: (m.v, m.r), 'have 4 finite bounds'),
+        (lambda m: (m.r, m.v), 'have 4 finite bounds'),
+        (lambda m: (m.b, m.u), 'have 3 finite bounds'),
     ],
 )
 def test_what_is_no_condition_is_refused_with_its_sides(m, write, cause):

@@ -2,12 +2,15 @@
 
 import importlib
 
+import flash
 import gas_liquid_tank
+import gene_network
 import numpy as np
 import oscillator
 import pyomo.environ as pyo
 import pytest
 import signum
+from scipy.integrate import solve_ivp
 
 import pyomo_fesd
 
@@ -21,7 +24,11 @@ RADAU, LEGENDRE = 'LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE'
         ('toy_mpec', '21 certified'),
         ('gas_liquid_tank', '9.354868539 s'),
         ('oscillator', 'The circle is crossed at t = 1.000'),
+        ('saturating_valve', 't = 2.52605715: the valve follows'),
+        ('flash', 'It boils from 37.89257'),
+        ('projected_ellipse', 'time 0.42743'),
         ('pump_curve', 'time 2.566377815: q = 30  above -> below'),
+        ('gene_network', 'gene 1 is expressed for 0.900000'),
     ],
 )
 def test_example_says_what_it_found_and_draws(name, said, tmp_path, monkeypatch, capsys):
@@ -89,3 +96,63 @@ def test_oscillator_shows_the_order_of_the_scheme(scheme, ncp, numbers, order):
     # how the elements are shared between the two sides of the switch differs from grid to grid: a fit over three
     errors = [oscillator.error(oscillator.solve(N, ncp, scheme)[0]) for N in numbers]
     assert -np.polyfit(np.log(numbers), np.log(errors), 1)[0] > order - 0.5
+
+
+@pytest.mark.parametrize('start', [0.0, 0.5, 1.0])
+@pytest.mark.parametrize('scheme, ncp', [(RADAU, 1), (RADAU, 2), (LEGENDRE, 2)])
+def test_flash_finds_the_phases_to_1e_8_from_any_vapour_fraction(scheme, ncp, start):
+    m = flash.build()
+    m.v[...].set_value(start)
+    assert flash.solve(m, nfe=10, ncp=ncp, scheme=scheme).solver.stationarity == 'B'
+    boils, dry = pyomo_fesd.switches(m)
+    assert (boils.time, dry.time) == pytest.approx(flash.EXACT, abs=1e-8)
+    assert (boils.before, boils.after, dry.after) == ('at lower bound', 'between', 'at upper bound')
+
+
+def test_flash_has_the_times_of_the_reference():
+    assert flash.EXACT == pytest.approx((37.892580, 364.553654), abs=1e-6)
+
+
+def test_flash_is_smaller_than_with_three_modes():
+    small, large = (pyomo_fesd.report(flash.transform(build())) for build in (flash.build, flash.build_modes))
+    assert [small[name] for name in ('variables', 'constraints', 'pairs')] == [511, 410, 42]
+    assert [large[name] for name in ('variables', 'constraints', 'pairs')] == [757, 615, 63]
+def network_by_events(times):
+    """The gene network integrated from event to event: starved gene 1, then protein 1 slides, then protein 2 too."""
+    g = gene_network
+    stretches = [
+        (lambda t, x: [-4.5 * x[0], 40 - 1.5 * x[1]], lambda t, x: x[0] - g.ENOUGH),
+        (lambda t, x: [0, 40 - 1.5 * x[1]], lambda t, x: x[1] - g.ENOUGH),
+        (lambda t, x: [0, 0], lambda t, x: 1),
+    ]
+    start, state, events, found = 0.0, [g.START[1], g.START[2]], [], np.empty((2, len(times)))
+    for rate, event in stretches:
+        event.terminal = True
+        run = solve_ivp(rate, (start, g.END), state, events=event, rtol=1e-12, atol=1e-12, dense_output=True)
+        here = times >= start
+        found[:, here] = run.sol(times[here])
+        start, state = run.t[-1], run.y[:, -1]
+        events.append(start)
+    return found, events[:2]
+
+
+@pytest.mark.parametrize('form', ['stewart', 'heaviside'])
+def test_the_gene_network_is_that_of_an_integration_with_events_in_both_forms(form):
+    m, results = gene_network.solve(form)
+    assert results.solver.stationarity == 'B'
+    times, boundaries = pyomo_fesd.physical_time(m), m.t.get_finite_elements()
+    expected, slides = network_by_events(np.array([times[t] for t in boundaries]))
+    for i in m.gene:
+        assert [m.x[i, t].value for t in boundaries] == pytest.approx(expected[i - 1], abs=1e-8)
+    found = pyomo_fesd.switches(m)
+    assert [s.time for s in found] == pytest.approx(gene_network.exact_switches(), abs=1e-8)
+    assert [s.time for s in found[1:]] == pytest.approx(slides, abs=1e-8)
+
+
+def test_the_heaviside_form_of_the_gene_network_is_a_third_smaller():
+    sizes = {form: pyomo_fesd.report(gene_network.solve(form, nfe=8)[0]) for form in ('stewart', 'heaviside')}
+    per_time = {'variables': 9 - 6, 'constraints': 5 - 2}  # of each gene: 4 regions against 2 functions
+    labels = 8 * 3 + 1
+    for name, saved in per_time.items():
+        assert sizes['stewart'][name] - sizes['heaviside'][name] == 2 * saved * labels
+    assert sizes['stewart']['pairs'] == sizes['heaviside']['pairs']

@@ -98,7 +98,7 @@ def test_every_mode_has_its_multiplier_at_every_time():
     assert all(pyo.value(found[f'below[{t}]'] + found[f'above[{t}]']) == pytest.approx(1) for t in m.t)
 
 
-@pytest.mark.parametrize('form', ['two_mode', 'stewart'])
+@pytest.mark.parametrize('form', ['two_mode', 'stewart', 'heaviside'])
 def test_parts_that_are_continuous_in_time_point_to_their_equation(form):
     m = transform(signum.build(), 3, form=form)
     for part, rule in marks.marked(m, marks.CONTINUOUS):
@@ -106,6 +106,15 @@ def test_parts_that_are_continuous_in_time_point_to_their_equation(form):
         for index in part:
             equation = rule[index] if index in rule else rule[(index, 1) if not isinstance(index, tuple) else index]
             assert any(v is part[index] for v in identify_variables(equation.body))
+
+
+def test_what_logic_between_modes_has_switched_off_is_told_from_what_the_user_has():
+    m = signum.build()
+    m.logic = pyo.LogicalConstraint(m.t, rule=lambda m, t: pyo.lnot(m.above[t].indicator_var))
+    m.other = pyo.LogicalConstraint(m.t, rule=lambda m, t: m.below[t].indicator_var)
+    m.other.deactivate()
+    dcs(m)
+    assert {c.name for c, _ in marks.marked(m, marks.REPLACED)} == {c.name for c in (*m.logic.values(), *m.above.values())}
 
 
 def test_every_decided_pair_points_to_its_equation_of_equal_length():

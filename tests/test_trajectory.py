@@ -129,7 +129,7 @@ def test_multipliers_are_one_where_the_mode_is_active_and_add_up_to_one(solved):
     assert below[frame.index > 2 / 3 + 1e-6].tolist() == pytest.approx([0] * int(sum(frame.index > 2 / 3 + 1e-6)))
 
 
-@pytest.mark.parametrize('form', ['two_mode', 'stewart'])
+@pytest.mark.parametrize('form', ['two_mode', 'stewart', 'heaviside'])
 def test_multipliers_are_shown_in_every_form(form):
     frame = pyomo_fesd.trajectory(run(sliding.build(), nfe=5, form=form))
     last = frame.iloc[-1]

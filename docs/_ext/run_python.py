@@ -73,6 +73,7 @@ def _captured():
     stream = io.StringIO()
     handler, logger = logging.StreamHandler(stream), logging.getLogger('pyomo_fesd')
     handler.setFormatter(logging.Formatter('WARNING: %(message)s'))
+    handler.setLevel(logging.WARNING)
     logger.addHandler(handler)
     logger.propagate = False
     try:

@@ -46,10 +46,16 @@ class ModeEquations:
     equations: list
     used: list
 
-    def shared(self, j):
-        """Whether all modes give v_j the same right-hand side."""
-        first, *others = (f[j] for f in self.rhs)
-        return first is not None and all(f is not None and _same(first, f) for f in others)
+    def alike(self, j):
+        """The modes by number, those together that give v_j the same right-hand side."""
+        groups = []
+        for i, f in enumerate(self.rhs):
+            group = next((g for g in groups if f[j] is not None and _same(self.rhs[g[0]][j], f[j])), None)
+            if group is None:
+                groups.append([i])
+            else:
+                group.append(i)
+        return groups
 
 
 def _same(a, b):

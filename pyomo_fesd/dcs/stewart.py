@@ -23,7 +23,17 @@ def applies(system):
 
 def size(system):
     """Number of regions, counting each full sign pattern."""
-    return sum(map(len, system.regions.patterns))
+    return len(owners(system))
+
+
+def count(system):
+    """Variables, constraints and pairs of one time."""
+    return 4 * size(system) + 2
+
+
+def owners(system):
+    """The modes whose multiplier each pair holds: one region after the other."""
+    return [mode for mode, patterns in enumerate(system.regions.geometry.patterns) for _ in patterns]
 
 
 def declare(block, index, regions):
@@ -40,14 +50,13 @@ def declare(block, index, regions):
 
 
 def add(block, index, system):
-    """Add one time of one Disjunction; returns the weight of each mode, the sum of nu over its regions."""
-    owner, g = [], []
-    for mode, patterns in enumerate(system.regions.patterns):
-        for pattern in patterns:
-            owner.append(mode)
-            g.append(sum(-c if sign > 0 else c for sign, c in zip(pattern, system.regions.functions)))
-    nu = minimise(block, index, g)
-    return [sum(n for n, o in zip(nu, owner) if o == mode) for mode in range(len(system.modes))]
+    """Add one time of one Disjunction."""
+    patterns = [pattern for owned in system.regions.geometry.patterns for pattern in owned]
+    minimise(
+        block,
+        index,
+        [sum(-c if sign > 0 else c for sign, c in zip(pattern, system.regions.functions)) for pattern in patterns],
+    )
 
 
 def minimise(block, index, g):
@@ -66,6 +75,11 @@ def minimise(block, index, g):
             marks.mark(block, marks.SELECTOR, nu[i])
     block.simplex.add(index or None, sum(nu) == 1)
     return nu
+
+
+def weight(block, index, system, modes):
+    """The sum of nu over the regions of some of the ``modes``, by number."""
+    return sum(block.nu[(*index, i)] for i, mode in enumerate(owners(system), start=1) if mode in modes)
 
 
 def equations(block, index):

@@ -2,14 +2,15 @@
 
 from dataclasses import dataclass
 
-from pyomo.common.collections import ComponentSet
-from pyomo.core import Block, BooleanVar, Constraint, LogicalConstraint, Var
+from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.core import Block, LogicalConstraint, Var
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import DerivativeVar
-from pyomo.gdp import Disjunct, Disjunction
+from pyomo.gdp import Disjunct
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd.dcs.modes import ModeEquations, read_equations
+from pyomo_fesd.dcs.nested import Tree
 from pyomo_fesd.dcs.regions import Regions, read_regions
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import refuse_foreign
@@ -21,24 +22,28 @@ class System:
 
     Attributes
     ----------
-    disjunction : DisjunctionData
-    modes : list of DisjunctData
+    tree : Tree
+        the Disjunction with those nested in it
+    modes : list of Mode
         the modes that can be active (a deactivated disjunct or one whose indicator is fixed to False is left out)
     regions : Regions or None
     equations : ModeEquations or None
         both None where only one mode is left: its constraints then simply hold
     """
 
-    disjunction: object
+    tree: Tree
     modes: list
     regions: Regions
     equations: ModeEquations
 
+    @property
+    def disjunction(self):
+        """The outermost DisjunctionData."""
+        return self.tree.disjunction
+
 
 #: What a disjunct over time cannot contain, and what to do about it.
 REFUSED_INSIDE = {
-    Disjunction: ("contains another Disjunction", "nested switching is not supported yet: write the modes in one Disjunction"),
-    Disjunct: ("contains another Disjunct", "nested switching is not supported yet: write the modes in one Disjunction"),
     LogicalConstraint: ("contains a LogicalConstraint", "state the mode by its region and its equations only"),
     Complementarity: ("contains a Complementarity", "declare it outside the disjuncts, over time"),
 }
@@ -70,56 +75,45 @@ class Reader:
         """Whether ``v`` is data of a differential state."""
         return v.parent_component() in self._states
 
-    def read(self, disjunction):
-        """Read one DisjunctionData into a ``System``; the model is not changed."""
-        if not disjunction.xor:
-            raise FesdError(
-                disjunction,
-                "it is declared with xor=False: several modes may be active at once",
-                "a switching system is in one mode at a time: leave xor at True",
-            )
-        modes = [d for d in disjunction.disjuncts if self._possible(disjunction, d)]
-        chosen = [d for d in modes if d.indicator_var.fixed and d.indicator_var.value]
-        if len(chosen) > 1:
-            raise FesdError(
-                disjunction,
-                "two modes are fixed to True: " + ', '.join(f"'{d.name}'" for d in chosen),
-                "a switching system is in one mode at a time: fix one indicator only",
-            )
-        modes = chosen or modes
-        if not modes:
-            raise FesdError(disjunction, "all its disjuncts are switched off", "activate one, or deactivate the Disjunction")
-        for disjunct in modes:
-            self._refuse_contents(disjunct)
+    def read(self, tree, modes):
+        """Read the ``modes`` that are left of a tree into a ``System``; the model is not changed."""
         if len(modes) == 1:
-            return System(disjunction, modes, None, None)
-        split = [_constraints(d) for d in modes]
-        for disjunct, (equalities, inequalities) in zip(modes, split):
+            self._refuse_all_contents(tree, modes)
+            return System(tree, modes, None, None)
+        equations, inequalities = self.contents(tree, modes)
+        patterns = self._patterns.setdefault(self._times.split(tree.disjunction)[1], {})
+        regions = read_regions(tree.disjunction, modes, inequalities, patterns)
+        _refuse_defined_in_regions(tree.disjunction, regions.functions, equations)
+        return System(tree, modes, regions, equations)
+
+    def contents(self, tree, modes):
+        """What two or more modes define (``ModeEquations``), and the inequalities of each."""
+        disjunction = tree.disjunction
+        self._refuse_all_contents(tree, modes)
+        split = [_constraints(mode) for mode in modes]
+        for mode, (equalities, inequalities) in zip(modes, split):
             mentioned = (v for c in (*equalities, *inequalities) for v in identify_variables(c.body))
-            refuse_foreign(mentioned, disjunction.model(), disjunct)
+            refuse_foreign(mentioned, disjunction.model(), mode)
         self._refuse_derivatives_in_regions(split)
-        _, family = self._times.split(disjunction)
-        choice, patterns = self._choices.setdefault(family, {}), self._patterns.setdefault(family, {})
+        choice = self._choices.setdefault(self._times.split(disjunction)[1], {})
         equalities, inequalities = ([part[k] for part in split] for k in (0, 1))
         equations = read_equations(disjunction, modes, equalities, self.is_derivative, self.is_state, choice)
-        regions = read_regions(disjunction, modes, inequalities, patterns)
-        _refuse_defined_in_regions(disjunction, regions, equations)
-        return System(disjunction, modes, regions, equations)
+        return equations, inequalities
+
+    def _refuse_all_contents(self, tree, modes):
+        known = ComponentSet(tree.disjuncts())
+        for disjunct in ComponentSet(d for mode in modes for d in mode.disjuncts):
+            self._refuse_contents(disjunct, known)
 
     @staticmethod
-    def _possible(disjunction, disjunct):
-        if disjunct.active:
-            return not (disjunct.indicator_var.fixed and disjunct.indicator_var.value is False)
-        if disjunct.transformation_block is not None:
-            raise FesdError(
-                disjunct,
-                f"another transformation has already treated this disjunct of '{disjunction.name}'",
-                "apply fesd.dcs instead of, not after, gdp.bigm or gdp.hull",
-            )
-        return False
-
-    @staticmethod
-    def _refuse_contents(disjunct):
+    def _refuse_contents(disjunct, known):
+        for inside in disjunct.component_data_objects(Disjunct, active=True, descend_into=Block):
+            if inside not in known:
+                raise FesdError(
+                    disjunct,
+                    f"contains the Disjunct '{inside.name}', which belongs to no active Disjunction at the same time",
+                    "write a Disjunction of the inner disjuncts, or deactivate it",
+                )
         for ctype, (cause, fix) in REFUSED_INSIDE.items():
             inside = next(disjunct.component_data_objects(ctype, active=True, descend_into=Block), None)
             if inside is not None:
@@ -141,9 +135,9 @@ class Reader:
                         )
 
 
-def _refuse_defined_in_regions(disjunction, regions, equations):
+def _refuse_defined_in_regions(disjunction, functions, equations):
     defined = ComponentSet(equations.defined)
-    for c in regions.functions:
+    for c in functions:
         for v in identify_variables(c, include_fixed=True):
             if v in defined:
                 raise FesdError(
@@ -153,26 +147,29 @@ def _refuse_defined_in_regions(disjunction, regions, equations):
                 )
 
 
-def _constraints(disjunct):
-    """The equalities and the inequalities of a disjunct."""
+def _constraints(mode):
+    """The equalities and the inequalities of a mode."""
     equalities, inequalities = [], []
-    for con in disjunct.component_data_objects(Constraint, active=True, descend_into=Block):
+    for con in mode.constraints():
         (equalities if con.equality else inequalities).append(con)
     return equalities, inequalities
 
 
-def refuse_logic_over_time(block, time):
-    """LogicalConstraints and BooleanVars over time are not part of a switching system.
+def refuse_twice_defined(systems, known):
+    """Two Disjunctions that define the same variable over-determine it.
 
     Parameters
     ----------
-    time : callable ComponentData -> time label or None
+    known : ComponentMap VarData -> DisjunctionData
+        what was transformed before
     """
-    for ctype in (LogicalConstraint, BooleanVar):
-        for data in block.component_data_objects(ctype, active=True, descend_into=Block):
-            if time(data) is not None:
+    owners = ComponentMap(known)
+    for system in systems:
+        for v in system.equations.defined if system.equations is not None else ():
+            if v in owners:
                 raise FesdError(
-                    data,
-                    f"a {ctype.__name__} over time",
-                    "the state decides the mode: write logic between modes as regions of one Disjunction",
+                    v,
+                    f"both '{owners[v].name}' and '{system.disjunction.name}' define it",
+                    "let each Disjunction define a contribution of its own, and add them up: m.dx[t] == m.F1[t] + m.F2[t]",
                 )
+            owners[v] = system.disjunction

@@ -14,15 +14,17 @@ from pyomo.core.util import target_list
 from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import marks, records
-from pyomo_fesd.dcs import stewart, two_mode
+from pyomo_fesd.dcs import heaviside, memory, stewart, two_mode
 from pyomo_fesd.dcs.images import image, source
+from pyomo_fesd.dcs.logic import modes_left, read_exclusions, read_logic, replace_logic
+from pyomo_fesd.dcs.nested import Nesting
 from pyomo_fesd.dcs.pieces import Pieces
-from pyomo_fesd.dcs.system import Reader, refuse_logic_over_time
+from pyomo_fesd.dcs.system import Reader, refuse_twice_defined
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
 
-#: The forms, smallest first: 'auto' takes the first that applies.
-FORMS = {form.NAME: form for form in (two_mode, stewart)}
+#: The forms: 'auto' takes the smallest that applies, the first of those as small.
+FORMS = {form.NAME: form for form in (two_mode, stewart, heaviside)}
 
 
 @TransformationFactory.register('fesd.dcs', doc="Time-indexed Disjunctions to a dynamic complementarity system (Filippov)")
@@ -34,9 +36,10 @@ class DynamicComplementaritySystem(Transformation):
 
         v = sum_i nu_i f_i,   sum_i nu_i = 1,   nu_i >= 0,   nu_i = 0 outside the closure of R_i
 
-    with the conditions on nu as complementarity in the smallest form that fits: eq. (5) for two modes, eq. (3) for more.
+    with the conditions on nu as complementarity in the smallest form that fits: eq. (5) for two modes, eq. (3) or (6) for more.
     An equation that all modes share is not blended; a mode that is switched off leaves nothing; if only one mode is left, its
-    constraints hold as they are.
+    constraints hold as they are.  Nested Disjunctions are one system, whose modes are the ways down to an innermost disjunct.
+    LogicalConstraints over time between the indicators of modes switch modes off, or become pairs that exclude combinations.
 
     Functions in pieces over time (``Piecewise``, ``PiecewiseLinearFunction``, ``Expr_if``) become complementarity too, by eq. (8)
     where they are continuous and by eq. (5) where they jump.
@@ -63,7 +66,17 @@ class DynamicComplementaritySystem(Transformation):
         ConfigValue(
             default='auto',
             domain=In(['auto', *FORMS]),
-            description="'two_mode' (eq. 5), 'stewart' (eq. 3), or 'auto': the smallest that fits",
+            description="'two_mode' (eq. 5), 'stewart' (eq. 3), 'heaviside' (eq. 6), or 'auto': the smallest that fits",
+        ),
+    )
+
+    CONFIG.declare(
+        'memory',
+        ConfigValue(
+            default=[],
+            domain=target_list,
+            description="Disjunctions (or Blocks with Disjunctions) with hysteresis: where regions overlap the last mode goes on; "
+            "the mode at the first time is told by fixing its indicator there",
         ),
     )
 
@@ -72,19 +85,27 @@ class DynamicComplementaritySystem(Transformation):
         config.set_value(kwds)
         wrt = find_continuous_set(instance, config.wrt, 'fesd.dcs')
         times = TimeIndex(wrt)
-        found = [d for d in _disjunctions(instance, config.targets) if times.time(d) is not None]
-        for block in _blocks(instance, config.targets):
-            refuse_logic_over_time(block, times.time)
+        remembered = ComponentSet(_disjunctions(instance, config.memory)) if config.memory else ComponentSet()
+        nesting = Nesting(instance.model(), times, remembered)
+        found = nesting.outermost(_disjunctions(instance, config.targets), config.targets or ())
         reader = Reader(derivatives(instance.model(), wrt), times)
+        defined = instance.model().private_data('pyomo_fesd.dcs').defined
         with PauseGC(), ExitStack() as undo:
             inside = [disjunct for d in found if config.targets for disjunct in d.disjuncts if disjunct.active]
             Pieces(_one_block(instance), times, undo).replace_all([*_blocks(instance, config.targets), *inside])
-            systems = [reader.read(d) for d in found]
+            trees = [nesting.tree(d) for d in found]
+            propositions = read_logic(_blocks(instance, config.targets), trees, times)
+            modes = modes_left(trees, propositions)
+            systems = [_read(reader, tree, modes[tree], tree.disjunction in remembered) for tree in trees]
+            refuse_twice_defined(systems, defined)
+            exclusions = read_exclusions(propositions, systems)
             forms = [self._form(config.form, system) for system in systems]
             undo.pop_all()
-            for system, form in zip(systems, forms):
-                _add(system, form)
-        records.repeat_after_expansion(instance, 'fesd.dcs', wrt, targets=config.targets, form=config.form)
+            weights = {system.tree: _add(system, form, defined) for system, form in zip(systems, forms)}
+            for proposition in propositions:
+                replace_logic(_dcs_block(proposition.constraint.parent_block()), proposition, exclusions, weights)
+        keywords = {'targets': config.targets, 'form': config.form, 'memory': config.memory}
+        records.repeat_after_expansion(instance, 'fesd.dcs', wrt, **keywords)
         records.rewrite_integrands(instance, 'fesd.dcs', wrt)
 
     def rewriter(self, instance, wrt, owner):
@@ -96,14 +117,14 @@ class DynamicComplementaritySystem(Transformation):
     def _form(wanted, system):
         if len(system.modes) == 1:
             return None
-        for name, form in FORMS.items():
-            if wanted in ('auto', name) and form.applies(system):
-                return form
-        raise FesdError(
-            system.disjunction,
-            f"form='{wanted}' does not fit: {len(system.modes)} modes with {len(system.regions.functions)} switching function(s)",
-            "use form='auto'",
-        )
+        if memory.applies(system):
+            return memory
+        if wanted == 'auto':
+            return min((form for form in FORMS.values() if form.applies(system)), key=lambda form: form.count(system))
+        form = FORMS[wanted]
+        if not form.applies(system):
+            raise FesdError(system.disjunction, f"form='{wanted}' does not fit: {form.why_not(system)}", "use form='auto'")
+        return form
 
     # Pyomo's names for the reverse maps
 
@@ -112,17 +133,24 @@ class DynamicComplementaritySystem(Transformation):
         return _maps(component).disjunction[component]
 
     def get_src_disjunct(self, component):
-        """The DisjunctData whose multiplier a generated complementarity holds."""
+        """The DisjunctData whose multiplier a generated complementarity holds.
+
+        A step variable of the Heaviside form that is no mode's own multiplier has none: ``KeyError``.
+        """
         return _maps(component).disjunct[component]
 
     def get_src_constraint(self, component):
         """The constraints of the disjuncts that a generated constraint blends (a list, one or more for each mode).
 
-        For the image of a constraint or a Piecewise outside disjuncts, a list of this one.
+        Of a pair that excludes modes, the LogicalConstraint that says so; for the image of a constraint or a Piecewise outside
+        disjuncts, a list of this one.
         """
         if source(component) is not None:
             return [source(component)]
-        return [con if source(con) is None else source(con) for con in _maps(component).sources[component]]
+        found = _maps(component).sources[component]
+        if not isinstance(found, list):
+            return found
+        return [con if source(con) is None else source(con) for con in found]
 
     def get_transformed_constraints(self, constraint):
         """The generated constraints that took the place of a ``constraint`` of a disjunct, or of one with functions in pieces."""
@@ -138,21 +166,23 @@ class DynamicComplementaritySystem(Transformation):
 
     def get_multipliers(self, disjunction):
         """nu of a transformed DisjunctionData: a ComponentMap from its disjuncts to expressions."""
-        block = _dcs_block(disjunction)
-        marked = ComponentMap(marks.marked(block, marks.INDICATOR)) if block is not None else ComponentMap()
+        blocks = ComponentSet(d.transformation_block for d in disjunction.disjuncts if d.transformation_block is not None)
+        marked = ComponentMap(item for block in blocks for item in marks.marked(block, marks.INDICATOR))
         return ComponentMap((d, marked[d]) for d in disjunction.disjuncts if d in marked)
 
 
 class _Maps(AutoSlots.Mixin):
     """Where the generated components came from; kept as private data of the block that holds them."""
 
-    __slots__ = ('disjunction', 'disjunct', 'sources', 'images')
+    __slots__ = ('disjunction', 'disjunct', 'sources', 'images', 'defined')
 
     def __init__(self):
         self.disjunction = ComponentMap()
         self.disjunct = ComponentMap()
         self.sources = ComponentMap()
         self.images = ComponentMap()
+        #: on the model: the DisjunctionData that defines a variable
+        self.defined = ComponentMap()
 
 
 Block.register_private_data_initializer(_Maps, scope='pyomo_fesd.dcs')
@@ -162,16 +192,21 @@ def _maps(component):
     return component.parent_block().private_data('pyomo_fesd.dcs')
 
 
-def _one_block(instance):
-    """The block that holds what belongs to all of ``instance``."""
-    return instance if isinstance(instance, BlockData) else instance.parent_block()
-
-
 def _blocks(instance, targets):
     """The blocks in which to look."""
     for target in targets or [instance]:
         if target.ctype is Block:
             yield from target.values() if not isinstance(target, BlockData) else [target]
+
+
+def _one_block(instance):
+    """The block that holds what belongs to all of ``instance``."""
+    return instance if isinstance(instance, BlockData) else instance.parent_block()
+
+
+def _read(reader, tree, modes, remembered):
+    """One system; one mode that is left needs no memory."""
+    return memory.read(reader, tree, modes) if remembered and len(modes) > 1 else reader.read(tree, modes)
 
 
 def _disjunctions(instance, targets):
@@ -192,30 +227,28 @@ def _disjunctions(instance, targets):
             )
 
 
-def _dcs_block(disjunction):
-    """The block of everything generated on the parent of ``disjunction``; None before."""
-    return disjunction.parent_block().component(marks.GENERATED + 'dcs')
+def _dcs_block(parent):
+    """The block on ``parent`` for everything generated beside its components."""
+    name = marks.GENERATED + 'dcs'
+    if parent.component(name) is None:
+        parent.add_component(name, Block())
+    return parent.component(name)
 
 
 def _form_block(system, form):
     """The block that holds one form of one Disjunction; made at its first time."""
-    disjunction = system.disjunction
-    component, parent = disjunction.parent_component(), disjunction.parent_block()
-    if _dcs_block(disjunction) is None:
-        parent.add_component(marks.GENERATED + 'dcs', Block())
+    component, home = system.disjunction.parent_component(), _dcs_block(system.disjunction.parent_block())
     name = component.local_name
     if form is None:
         name += '_single_mode'
     elif form is not two_mode:
         name += f'_{form.NAME}_{form.size(system)}'
-    block = _dcs_block(disjunction).component(name)
+    block = home.component(name)
     if block is None:
         block = Block()
-        _dcs_block(disjunction).add_component(name, block)
+        home.add_component(name, block)
         index = (component.index_set(),) if component.is_indexed() else ()
-        if form is two_mode:
-            form.declare(block, index)
-        elif form is not None:
+        if form is not None:
             form.declare(block, index, form.size(system))
         block.numbers = Set(dimen=1)
         block.mode = Constraint(*index, block.numbers)
@@ -226,7 +259,7 @@ def _form_block(system, form):
 
 def _number_of_equations(system):
     if system.equations is None:
-        return sum(1 for _ in system.modes[0].component_data_objects(Constraint, active=True, descend_into=Block))
+        return sum(1 for _ in system.modes[0].constraints())
     return len(system.equations.defined)
 
 
@@ -236,37 +269,56 @@ def _index(disjunction):
     return () if index is None else index if isinstance(index, tuple) else (index,)
 
 
-def _add(system, form):
-    """Generate everything for one Disjunction at one time, and switch the source off."""
+def _add(system, form, defined):
+    """Generate everything for one Disjunction at one time, and switch the source off.
+
+    Returns
+    -------
+    callable
+        the sum of the multipliers of some modes, given by their numbers
+    """
     block, index = _form_block(system, form), _index(system.disjunction)
+
+    def weight(modes):
+        return 1.0 if len(modes) == len(system.modes) else form.weight(block, index, system, modes)
+
     if form is None:
         _impose_only_mode(block, index, system)
     else:
-        weights = form.add(block, index, system)
-        _blend(block, index, system, weights)
-        for disjunct, weight in zip(system.modes, weights):
-            marks.mark(block, marks.INDICATOR, disjunct, weight)
+        form.add(block, index, system)
+        _blend(block, index, system, weight)
+        _mark_indicators(block, system, weight)
         _map_form(block, index, system, form)
+        defined.update((v, system.disjunction) for v in system.equations.defined)
     _switch_off(block, system)
+    return weight
 
 
 def _impose_only_mode(block, index, system):
     """One mode left: its equations and its region simply hold."""
-    (disjunct,) = system.modes
-    constraints = disjunct.component_data_objects(Constraint, active=True, descend_into=Block)
-    for j, con in enumerate(constraints, start=1):
+    (mode,) = system.modes
+    for j, con in enumerate(mode.constraints(), start=1):
         _connect(block, block.mode.add((*index, j), con.expr), system, [con])
 
 
-def _blend(block, index, system, weights):
+def _mark_indicators(block, system, weight):
+    """nu of every disjunct: the sum over the modes that it is part of."""
+    for disjunct in system.tree.disjuncts():
+        modes = [i for i, mode in enumerate(system.modes) if disjunct in mode]
+        if modes:
+            marks.mark(block, marks.INDICATOR, disjunct, weight(modes))
+
+
+def _blend(block, index, system, weight):
     """v = sum_i nu_i f_i (eq. 7); v = f where all modes agree; mode copies of v where a mode is implicit."""
     equations = system.equations
     copies = [_copies(block, index, system, i) if None in f else f for i, f in enumerate(equations.rhs)]
     for j, v in enumerate(equations.defined):
-        if equations.shared(j):
-            expr = copies[0][j]
+        alike = [(modes, copies[modes[0]][j]) for modes in equations.alike(j)]
+        if len(alike) == 1:
+            expr = alike[0][1]
         else:
-            expr = sum(w * f[j] for w, f in zip(weights, copies) if not (isinstance(f[j], (int, float)) and f[j] == 0))
+            expr = sum(weight(modes) * f for modes, f in alike if not (isinstance(f, (int, float)) and f == 0))
         _connect(block, block.mode.add((*index, j + 1), v == expr), system, [con for used in equations.used for con in used[j]])
 
 
@@ -301,19 +353,22 @@ def _map_form(block, index, system, form):
     maps = block.private_data('pyomo_fesd.dcs')
     for con in form.equations(block, index):
         maps.disjunction[con] = system.disjunction
-    owners = [d for d, patterns in zip(system.modes, system.regions.patterns) for _ in patterns]
-    for i, disjunct in enumerate(owners, start=1):
+    for i, mode in enumerate(form.owners(system), start=1):
         condition = block.complementarity[(*index, i)]
         maps.disjunction[condition] = system.disjunction
-        maps.disjunct[condition] = disjunct
+        if mode is not None and len(system.modes[mode].innermost) == 1:
+            (maps.disjunct[condition],) = system.modes[mode].innermost
 
 
 def _switch_off(block, system):
     """The sources keep their contents, inactive, as after Pyomo's own GDP transformations."""
-    system.disjunction.deactivate()
-    for disjunct in system.disjunction.disjuncts:
-        if disjunct.active and disjunct not in ComponentSet(system.modes):
+    for disjunction in (system.disjunction, *system.tree.nested):
+        disjunction.deactivate()
+    for disjunct in system.tree.disjuncts():
+        if any(disjunct in mode for mode in system.modes):
+            disjunct._deactivate_without_fixing_indicator()
+            disjunct._transformation_block = ref(block)
+        elif disjunct.active:
+            if any(disjunct in mode for mode in system.tree.modes):
+                marks.mark(block, marks.REPLACED, disjunct)
             disjunct.deactivate()
-    for disjunct in system.modes:
-        disjunct._deactivate_without_fixing_indicator()
-        disjunct._transformation_block = ref(block)

@@ -23,12 +23,22 @@ def applies(system):
     return len(system.modes) == 2 and len(system.regions.functions) == 1
 
 
+def why_not(system):
+    """What is too much for it."""
+    return f"{len(system.modes)} modes with {len(system.regions.functions)} switching function(s)"
+
+
 def size(system):
-    """Regions that the form distinguishes, part of its block's name."""
-    return 2
+    """Nothing to count: there is one size only."""
+    return None
 
 
-def declare(block, index):
+def count(system):
+    """Variables, constraints and pairs of one time."""
+    return 6
+
+
+def declare(block, index, size):
     """Declare the components of the form over ``index`` (a tuple of sets, empty for a scalar Disjunction)."""
     sparse = {'dense': False} if index else {}
     block.nu = Var(*index, **sparse, bounds=(0, 1))
@@ -42,17 +52,7 @@ def declare(block, index):
 
 
 def add(block, index, system):
-    """Add one time of one Disjunction.
-
-    Parameters
-    ----------
-    index : tuple
-
-    Returns
-    -------
-    list of expressions
-        the weight of each mode, nu and 1 - nu
-    """
+    """Add one time of one Disjunction; ``index`` is a tuple."""
     nu, p, n = (getattr(block, name)[index or None] for name in ('nu', 'p', 'n'))
     (c,) = system.regions.functions  # the first mode's own condition: it holds where c >= 0
     now = value_now(c) or 0.0
@@ -60,7 +60,18 @@ def add(block, index, system):
     block.switching.add(index or None, c == p - n)
     block.complementarity.add((*index, 1), complements(nu >= 0, n >= 0))
     block.complementarity.add((*index, 2), complements(1 - nu >= 0, p >= 0))
-    return [nu, 1 - nu]
+
+
+def weight(block, index, system, modes):
+    """The multiplier of one of the two modes: nu or 1 - nu."""
+    (mode,) = modes
+    nu = block.nu[index or None]
+    return 1 - nu if mode else nu
+
+
+def owners(system):
+    """The modes whose multiplier each pair holds."""
+    return [0, 1]
 
 
 def equations(block, index):

@@ -1,13 +1,10 @@
 """Cross complementarity: an active set that does not change inside an element (theory, eq. 11).
 
-Takes: the active Complementarities over time, whoever wrote them.
+Takes: the families of conditions over time, whoever wrote them.
 Leaves: ``cross`` (aggregated pairs by family and element), ``nonnegative`` (signs of sides that bounds do not imply),
 ``left_limit`` (Gauss only); the sources are switched off, except at the first time, where they hold as they are.
 Does not apply: to complementarities without time.
 """
-
-import logging
-from dataclasses import dataclass
 
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap, ComponentSet
@@ -17,24 +14,21 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
-from pyomo_fesd.complementarity import Mixed, read
-from pyomo_fesd.elements.continuity import read_continuity
-from pyomo_fesd.errors import FesdError
-from pyomo_fesd.timeindex import TimeIndex, strip_time
-
-logger = logging.getLogger('pyomo_fesd')
+from pyomo_fesd.elements.mixed import repeats, source
+from pyomo_fesd.values import mutable_parameters
 
 #: The three forms of eq. (11), with the number of point indices of each pair.
 FORMS = {'element': 0, 'stage': 1, 'full': 2}
 
 
 class _Sources(AutoSlots.Mixin):
-    """Private data of the block of a moving grid: the conditions that each aggregated pair stands for."""
+    """Private data of the block of a moving grid: the grid, and the conditions that each aggregated pair stands for."""
 
-    __slots__ = ('conditions',)
+    __slots__ = ('conditions', 'grid')
 
     def __init__(self):
         self.conditions = ComponentMap()
+        self.grid = None
 
 
 Block.register_private_data_initializer(_Sources, scope='pyomo_fesd.elements')
@@ -45,109 +39,14 @@ def sources(block):
     return block.private_data('pyomo_fesd.elements').conditions
 
 
-@dataclass(frozen=True)
-class Family:
-    """One complementarity condition over time.
-
-    Attributes
-    ----------
-    name : str
-    conditions : dict label -> ComplementarityData
-    sides : dict label -> Pair
-        jumping side first: the selector nu of eq. (11), then lam
-    continuous : tuple of bool
-        for each side, whether it is continuous in time and so enters with its boundary values too
-    rule : Constraint or None
-        what ties the continuous side to the states, where it is a marked variable
-    jumps_with_controls : bool
-        the continuous side contains a control that is held on each stage: no continuity from one stage to the next
-    """
-
-    name: str
-    conditions: dict
-    sides: dict
-    continuous: tuple
-    rule: object = None
-    jumps_with_controls: bool = False
-
-    def points(self, element):
-        """Stage labels of ``element`` at which the condition exists."""
-        return [t for t in element.points if t in self.sides]
-
-    def values(self, element, side, right_is_stage):
-        """Side 0 or 1 at the labels that take part in ``element``: its stages, and its boundaries if it is continuous."""
-        labels = self.points(element)
-        if self.continuous[side]:
-            left = () if element.opens_stage and self.jumps_with_controls else (element.left,)
-            boundaries = left if right_is_stage else (*left, element.right)
-            labels = labels + [t for t in boundaries if t in self.sides]
-        return [self.sides[t][side] for t in labels]
+def set_grid(block, grid):
+    """Remember the ``Grid`` of a moving grid on its block."""
+    block.private_data('pyomo_fesd.elements').grid = grid
 
 
-def read_families(block, wrt, controls, told=()):
-    """The complementarities over ``wrt`` on ``block``, by family.
-
-    Parameters
-    ----------
-    controls : list of Var
-        held constant on each stage
-    told : list of Var
-        variables of which the user says that they are continuous in time
-
-    Raises
-    ------
-    FesdError
-        for conditions with two bounds on one side (mixed complementarity) over time
-    """
-    times = TimeIndex(wrt)
-    datas = list(block.component_data_objects(Complementarity, active=True, descend_into=Block))
-    written = not all(map(marks.is_generated, datas))
-    continuity = read_continuity(block.model(), times, ComponentSet(controls), told, trace=written)
-    families = []
-    for name, conditions in times.families(datas).items():
-        sides = {t: read(c) for t, c in conditions.items()}
-        mixed = next((c for t, c in conditions.items() if isinstance(sides[t], Mixed)), None)
-        if mixed is not None:
-            raise FesdError(
-                mixed,
-                "a complementarity over time with two bounds on one side is not supported yet",
-                "write it as two conditions: l <= x perp F+ and x <= u perp F-, with F = F+ - F-",
-            )
-        inner = next((t for t in wrt if t in sides and t != wrt.first()), None)
-        smooth = tuple(map(continuity.holds, sides[inner])) if inner is not None else (False, False)
-        if inner is not None and not any(smooth):
-            logger.warning(
-                "%s: neither side is known to be continuous in time, so a switch inside an element may go unnoticed. Write one "
-                "side by differential states, or by variables that equations tie to them; or name its variables with the keyword "
-                "continuous.",
-                _public_name(name),
-            )
-        if smooth == (True, False):
-            sides, smooth = {t: (H, G) for t, (G, H) in sides.items()}, (False, True)
-        lam = sides[inner][1] if smooth[1] else None
-        rule, jumps = (continuity.rule(lam), continuity.jumps_at_stages(lam)) if smooth[1] else (None, False)
-        families.append(Family(_public_name(name), conditions, sides, smooth, rule, jumps))
-    return families
-
-
-def warn_gauss_on_curved_surfaces(families):
-    """With Gauss, a slide on a curved surface has K + 1 conditions for K multipliers (theory, section 2): say so by name."""
-    named = ComponentSet()
-    for family in families:
-        rule = family.rule
-        if rule is not None and rule not in named and any(c.body.polynomial_degree() not in (0, 1) for c in rule.values()):
-            named.add(rule)
-            logger.warning(
-                "%s: the surface is curved. LAGRANGE-LEGENDRE can cross it but not slide on it; if the solver finds no feasible "
-                "point, use LAGRANGE-RADAU.",
-                _public_name(rule.name),
-            )
-
-
-def _public_name(name):
-    """A family's name as shown in reports: without time and without the package's own blocks."""
-    name = strip_time(name)
-    return '.'.join(part for part in name.split('.') if not part.startswith(marks.GENERATED))
+def grid_of(block):
+    """The ``Grid`` of a moving grid, by its block."""
+    return block.private_data('pyomo_fesd.elements').grid
 
 
 def add_cross_complementarity(block, families, grid, wrt, form):
@@ -159,7 +58,7 @@ def add_cross_complementarity(block, families, grid, wrt, form):
         for element in grid.elements:
             for index, (G, H) in _pairs(family, element, grid.right_is_stage, form):
                 pair = block.cross.add((family.name, element.n, *index), complements(G >= 0, H >= 0))
-                sources(block)[pair] = [family.conditions[t] for t in family.points(element)]
+                sources(block)[pair] = [source(family.conditions[t]) for t in family.points(element)]
     _add_signs(block, families)
     if not grid.right_is_stage:
         _hold_left_limits(block, families, grid, wrt)
@@ -193,9 +92,20 @@ def _add_signs(block, families):
     for family in families:
         for pair in family.sides.values():
             for expr in pair:
-                low = expr.lb if expr.is_variable_type() else lower.walk_expression(expr)[0]
-                if low is None or low < 0:
+                if not _never_negative(expr, lower):
                     block.nonnegative.add(expr >= 0)
+
+
+def _never_negative(expr, lower):
+    """Whether the bounds of the variables say so, whatever values mutable Params will have."""
+    if any(True for _ in mutable_parameters(expr)) or any(map(_bound_may_change, identify_variables(expr))):
+        return False
+    low = expr.lb if expr.is_variable_type() else lower.walk_expression(expr)[0]
+    return low is not None and low >= 0
+
+
+def _bound_may_change(v):
+    return any(hasattr(bound, 'is_expression_type') for bound in (v.lower, v.upper))
 
 
 def _hold_left_limits(block, families, grid, wrt):
@@ -207,11 +117,16 @@ def _hold_left_limits(block, families, grid, wrt):
     selectors = ComponentSet(c for c, _ in marks.marked(block.model(), marks.SELECTOR))
     held = ComponentSet()
     for family in families:
-        if family.continuous[0]:
+        if family.continuous[0] or _says_again(family):
             continue
         for element in grid.elements:
             if element.right in family.sides and family.points(element):
                 _hold(block, family, element, selectors, held)
+
+
+def _says_again(family):
+    t, (jumping, _) = next(iter(family.sides.items()))
+    return repeats(family.conditions[t], jumping)
 
 
 def _hold(block, family, element, selectors, held):

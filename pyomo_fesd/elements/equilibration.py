@@ -7,7 +7,9 @@ theta_n = G_n/(G_n + H_n) is 1 or 0, whatever the scale of lam, so
 
 is 1 where the active set goes on and 0 where it changes.  (The raw product B_lam F_lam + B_nu F_nu vanishes with h.)
 
-Takes: the families of ``cross``.
+A mode with memory has its weight in the place of theta; a jump of the state is a change.
+
+Takes: the families of ``cross`` that switch by themselves, the modes of ``memory``, the jumps on the block.
 Leaves: ``eta``, ``equal_length`` (inactive), ``equilibration`` (a Complementarity), ``deviation`` (the penalty term).
 """
 
@@ -17,6 +19,7 @@ from pyomo.core import Constraint, Expression, quicksum
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
+from pyomo_fesd.elements import jumps
 from pyomo_fesd.elements.lengths import element_length
 
 #: Keeps theta defined where both sums vanish (a grazing contact); far below any nu or lam that means something.
@@ -49,8 +52,9 @@ def none(block, rho):
 MODES = {'two_stage': two_stage, 'complementarity': complementarity, 'penalty': penalty, 'none': none}
 
 
-def add_equilibration(block, families, grid, mode, rho):
+def add_equilibration(block, families, modes, grid, mode, rho):
     """Add eta and the equilibration pairs between consecutive elements of each control stage."""
+    families = [f for f in families if not f.follows]
     by_number = {e.n: e for e in grid.elements}
     inner = [(e.n, f.n) for elements in grid.stages.values() for e, f in zip(elements, elements[1:])]
     block.theta = Expression(block.family, block.element)
@@ -63,7 +67,8 @@ def add_equilibration(block, families, grid, mode, rho):
     block.equal_length = Constraint(block.element)
     block.equilibration = Complementarity(block.element)
     for n, m in inner:
-        block.eta[n] = _unchanged(block, families, n, m)
+        remembered = [a.unchanged(by_number[n], by_number[m]) for a in modes if a.independent]
+        block.eta[n] = prod([*_unchanged(block, families, n, m), *remembered, *jumps.unchanged(block, by_number[n])])
         difference = element_length(block, by_number[m]) - element_length(block, by_number[n])
         block.equal_length.add(n, difference == 0)
         block.equilibration.add(n, complements((difference / by_number[n].length) ** 2 >= 0, block.eta[n] >= 0))
@@ -73,7 +78,7 @@ def add_equilibration(block, families, grid, mode, rho):
 
 
 def _unchanged(block, families, n, m):
-    """eta between elements n and m = n + 1."""
+    """pi_i of every family between elements n and m = n + 1."""
     pairs = [(block.theta[f.name, n], block.theta[f.name, m]) for f in families]
     # a family that is not there in one of them does not tell
-    return prod(a * b + (1 - a) * (1 - b) for a, b in pairs if a.expr is not None and b.expr is not None)
+    return [a * b + (1 - a) * (1 - b) for a, b in pairs if a.expr is not None and b.expr is not None]

@@ -2,13 +2,13 @@
 
 ``dae.collocation`` raises on a Disjunct, Disjunction or Complementarity over time (Pyomo issue #3101) and leaves the model half
 expanded.  Here they take part: while pyomo.dae works, Disjuncts and Complementarities pass as Blocks (which expand by their
-rule), Disjunctions step aside and get their new indices by their rule afterwards.
+rule), Disjunctions and LogicalConstraints step aside and get their new indices by their rule afterwards.
 """
 
 import logging
 from contextlib import contextmanager
 
-from pyomo.common.collections import ComponentMap
+from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.common.gc_manager import PauseGC
 from pyomo.common.log import LoggingIntercept
 from pyomo.core import (
@@ -33,7 +33,7 @@ from pyomo.mpec import Complementarity
 
 from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.errors import FesdError
-from pyomo_fesd.marks import is_generated
+from pyomo_fesd.marks import REPLACED, is_generated, marked
 from pyomo_fesd.timeindex import DISCRETISATION, TimeIndex, derivatives, is_indexed_by, strip_time
 
 logger = logging.getLogger('pyomo_fesd')
@@ -41,13 +41,14 @@ logger = logging.getLogger('pyomo_fesd')
 #: Types over time that pyomo.dae expands itself, or rightly leaves alone.
 NATIVE = (Var, Constraint, Expression, Block, DerivativeVar, Param, Suffix, Integral, Piecewise, ContinuousSet)
 #: Types over time that are treated here.
-HYBRID = (Disjunct, Disjunction, Complementarity)
+HYBRID = (Disjunct, Disjunction, Complementarity, LogicalConstraint)
+#: Those of them that get their new indices when pyomo.dae has finished, in this order: logic speaks of disjuncts.
+AFTERWARDS = (Disjunction, LogicalConstraint)
 #: Types over time that cannot be expanded, and what to do instead.
 REFUSED = {
     Objective: "write one Objective, e.g. with a pyomo.dae.Integral",
     SOSConstraint: "put it in a Block over time, or declare it after the discretisation",
-    LogicalConstraint: "let the state decide the mode, by the regions of a Disjunction",
-    BooleanVar: "let the state decide the mode, by the regions of a Disjunction",
+    BooleanVar: "let the state decide the mode, by the regions of a Disjunction; write logic between their indicators",
     Set: "use a Set that does not depend on time",
 }
 PLACES = (Block, Disjunct)
@@ -55,8 +56,13 @@ PLACES = (Block, Disjunct)
 SHOWN = 5
 
 
-def discretise(block, wrt, nfe, ncp, scheme):
-    """Put ``nfe`` elements of ``ncp`` points on ``wrt`` and expand everything over it; the same number in each stage.
+def discretise(block, wrt, shares, ncp, scheme, held=()):
+    """Put elements of ``ncp`` points on ``wrt``, ``shares`` of them in each control stage, and expand everything over it.
+
+    Parameters
+    ----------
+    held : list of components
+        controls whose new times get the value of their stage later
 
     Raises
     ------
@@ -65,11 +71,11 @@ def discretise(block, wrt, nfe, ncp, scheme):
     """
     _check(block, wrt)
     with restored_on_error(block, wrt), PauseGC():
-        inputs = _fixed_everywhere(block, wrt)
-        place_boundaries(wrt, nfe)
+        inputs = _fixed_everywhere(block, wrt, held)
+        place_boundaries(wrt, shares)
         try:
             with hybrid_expansion(block, wrt):
-                TransformationFactory('dae.collocation').apply_to(block, wrt=wrt, nfe=nfe, ncp=ncp, scheme=scheme)
+                TransformationFactory('dae.collocation').apply_to(block, wrt=wrt, nfe=sum(shares), ncp=ncp, scheme=scheme)
             _ask_missing_constraints(block, wrt)
         except KeyError as error:
             raise FesdError(
@@ -91,21 +97,21 @@ def _ask_missing_constraints(block, wrt):
                     component.rule(component.parent_block(), index)
 
 
-def place_boundaries(wrt, nfe):
-    """Divide each control stage (gap between the present points) into the same number of elements."""
+def place_boundaries(wrt, shares):
+    """Divide each control stage (gap between the present points) into elements of equal length."""
     stages = list(wrt)
-    each = nfe // (len(stages) - 1)
-    for left, right in zip(stages, stages[1:]):
+    for left, right, each in zip(stages, stages[1:], shares):
         for k in range(1, each):
             wrt.add(round(left + k * (right - left) / each, 6))
     wrt._fe = list(wrt)
     wrt.set_changed(True)
 
 
-def _fixed_everywhere(block, wrt):
+def _fixed_everywhere(block, wrt, held):
     """Names of variables over time that are fixed at all present points; states excepted, whose ends may both be given."""
-    states = ComponentMap((d.get_state_var(), None) for d in derivatives(block, wrt))
-    fixed = (v for v in block.component_data_objects(Var, descend_into=PLACES) if v.fixed and v.parent_component() not in states)
+    known = ComponentSet([*(d.get_state_var() for d in derivatives(block, wrt)), *(v for u in held for v in (u, *u.values()))])
+    variables = block.component_data_objects(Var, descend_into=PLACES)
+    fixed = (v for v in variables if v.fixed and v not in known and v.parent_component() not in known)
     families = TimeIndex(wrt).families(fixed)
     return [strip_time(name) for name, family in families.items() if len(family) == len(wrt)]
 
@@ -142,15 +148,15 @@ def _check(block, wrt):
 
 def _rule(component):
     """The rule by which a hybrid component gets its indices."""
-    return component._rule if component.ctype is Disjunct else component._init_rule
+    return component._rule if component.ctype in (Disjunct, LogicalConstraint) else component._init_rule
 
 
 @contextmanager
 def hybrid_expansion(block, wrt):
-    """While this lasts, pyomo.dae's discretisation of ``wrt`` expands Disjuncts, Disjunctions and Complementarities."""
+    """While this lasts, pyomo.dae's discretisation of ``wrt`` expands hybrid components too."""
     hybrid = [c for c in block.component_objects(HYBRID, descend_into=PLACES) if c.parent_component() is c]
     off = _switched_off(block, wrt)
-    aside = [c for c in hybrid if c.ctype is Disjunction or is_generated(c) or not c.index_set().isfinite() or _without(c)]
+    aside = [c for c in hybrid if c.ctype in AFTERWARDS or is_generated(c) or not c.index_set().isfinite() or _without(c)]
     waiting = ComponentMap((c, None) for c in aside)
     # pyomo.dae passes over Suffixes, and so over whatever bears their type; nothing changes its place in the model
     passing = [(c, c.ctype, Suffix if c in waiting else Block) for c in hybrid]
@@ -162,9 +168,10 @@ def hybrid_expansion(block, wrt):
     finally:
         for component, ctype, _ in passing:
             component.parent_block().reclassify_component_type(component, ctype)
-    for component in aside:
-        if component.ctype is Disjunction and is_indexed_by(component, wrt) and component._init_rule is not None:
-            _expand_disjunction(component, component.parent_block())
+    for ctype in AFTERWARDS:
+        for component in aside:
+            if component.ctype is ctype and is_indexed_by(component, wrt) and _rule(component) is not None:
+                _expand(component, component.parent_block())
     _switch_off_again(block, wrt, off)
 
 
@@ -176,9 +183,10 @@ def _without(component):
 def _switched_off(block, wrt):
     """Families of hybrid components that are off at every present time, by the user's will and not by a transformation."""
     times, off = TimeIndex(wrt), []
+    replaced = ComponentSet(c for c, _ in marked(block.model(), REPLACED))
     for ctype in HYBRID:
         families = times.families(block.component_data_objects(ctype, descend_into=PLACES))
-        off += [(ctype, name) for name, family in families.items() if not any(map(_in_use, family.values()))]
+        off += [(ctype, name) for name, family in families.items() if not any(c in replaced or _in_use(c) for c in family.values())]
     return off
 
 
@@ -203,10 +211,13 @@ def _switch_off_again(block, wrt, off):
                         data.deactivate()
 
 
-def _expand_disjunction(disjunction, home):
-    """Give a Disjunction its missing indices by its own rule."""
-    for index in disjunction.index_set():
-        if index not in disjunction._data:
-            disjuncts = apply_indexed_rule(disjunction, disjunction._init_rule, home, index)
-            if disjuncts is not Disjunction.Skip:
-                disjunction[index] = disjuncts
+def _expand(component, home):
+    """Give a Disjunction or LogicalConstraint its missing indices by its own rule."""
+    for index in component.index_set():
+        if index not in component._data:
+            if component.ctype is Disjunction:
+                stated = apply_indexed_rule(component, component._init_rule, home, index)
+            else:
+                stated = component.rule(home, index)
+            if stated is not component.Skip:
+                component[index] = stated

@@ -30,8 +30,10 @@ def warn_explicit_time(block, wrt, grid, integrands):
         if any(_differ([family[t] for t in points if stage[t] == s]) for s in {stage[t] for t in points}):
             logger.warning(
                 "%s: its numbers depend on the time label (a Param over time, or t itself in a rule). Labels are not physical "
-                "time once elements move. Use a clock state: a Var with derivative 1 that starts at the first time.",
+                "time once elements move. Take time from a clock state, pyomo_fesd.clock(m, m.%s)[t], or name inputs that are "
+                "constant on each control stage in piecewise_constant.",
                 strip_time(name),
+                wrt.local_name,
             )
 
 
@@ -41,13 +43,19 @@ def _families(block, wrt, grid, integrands):
     datas = (d for c in components if not c.local_name.endswith(DISCRETISATION) for d in c.values() if d.active)
     families = TimeIndex(wrt).families(datas)
     found = {name: {t: partial(_expression, d) for t, d in family.items()} for name, family in families.items()}
+    points = _spread([t for e in grid.elements for t in e.points])
     for integral, rule in integrands:
-        index = next(iter(integral.index_set())) if integral.is_indexed() else ()
-        index = index if isinstance(index, tuple) else (index,)
-        before, after = index[: integral.loc], index[integral.loc :]
-        points = _spread([t for e in grid.elements for t in e.points])
-        found[integral.name] = {t: partial(rule, integral.parent_block(), *before, t, *after) for t in points}
+        for name, (before, after) in _indices(integral):
+            found[name] = {t: partial(rule, integral.parent_block(), *before, t, *after) for t in points}
     return found
+
+
+def _indices(integral):
+    """Name and index, before and after time, of each of the integrals that a component stands for."""
+    for index in integral.index_set() if integral.is_indexed() else [()]:
+        index = index if isinstance(index, tuple) else (index,)
+        name = f'{integral.name}[{",".join(map(str, index))}]' if index else integral.name
+        yield name, (index[: integral.loc], index[integral.loc :])
 
 
 def _expression(data):

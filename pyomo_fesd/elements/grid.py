@@ -134,10 +134,34 @@ def _quadrature(tau):
     return tuple(float(b) for b in np.linalg.solve(moments, [1 / (k + 1) for k in range(K)]))
 
 
-def check_resolution(wrt, nfe, ncp):
+def share_elements(wrt, nfe):
+    """How many elements each control stage gets: as many as the others, or as ``nfe`` lists them.
+
+    Raises
+    ------
+    FesdError
+        if they cannot be shared equally, or if the list does not fit
+    """
+    stages = len(wrt) - 1
+    if isinstance(nfe, list):
+        if len(nfe) != stages:
+            raise FesdError(
+                wrt, f"nfe={nfe} lists {len(nfe)} numbers for {stages} control stages", "give one number for each stage"
+            )
+        return nfe
+    if nfe % stages:
+        raise FesdError(
+            wrt,
+            f"nfe={nfe} elements cannot be shared equally among {stages} control stages",
+            f"take a multiple of {stages}, or a list with one number for each stage",
+        )
+    return [nfe // stages] * stages
+
+
+def check_resolution(wrt, shares, ncp):
     """Refuse a grid whose labels would fall together when pyomo.dae rounds them to 6 decimals."""
     points = list(wrt)
-    shortest = min(b - a for a, b in zip(points, points[1:])) * (len(points) - 1) / nfe
+    shortest = min((b - a) / n for a, b, n in zip(points, points[1:], shares))
     # the first of ncp Radau or Legendre points lies about 1/(ncp + 1)**2 from the boundary
     if shortest / (ncp + 1) ** 2 < 2 * LABEL_RESOLUTION:
         raise FesdError(

@@ -3,9 +3,12 @@
 With pyomo.dae's equations the whole of (9) is: replace xdot by r_n xdot in the discretisation equation of element n, with the
 dimensionless multiplier r_n = h_n/hbar_n (hbar_n the nominal length); a k-th derivative gets r_n**k.  The names of the
 discretisation equations stay, as other tools look them up.
+
+With a free final time, or free lengths of the control stages, a unit of the labels lasts sigma_k units of the plant's time in stage
+k: derivatives get r_n sigma_k, integrals and times too.
 """
 
-from pyomo.core import Constraint, RangeSet, Set, Var
+from pyomo.core import Constraint, Expression, RangeSet, Set, Var
 from pyomo.core.expr.visitor import replace_expressions
 
 from pyomo_fesd.errors import FesdError
@@ -13,8 +16,8 @@ from pyomo_fesd.marks import ARTIFICIAL, mark
 from pyomo_fesd.timeindex import TimeIndex, derivatives
 
 
-def add_lengths(block, grid, gamma):
-    """Declare r_n and the length of every control stage.
+def add_lengths(block, grid, gamma, factors=None):
+    """Declare r_n and the length of every control stage; sigma of each element if there are ``factors`` (by stage).
 
     Leaves ``block.element`` (1..N), ``block.stage``, ``block.r`` and ``block.stage_length``: sum_n hbar_n r_n = nominal length of
     the stage (eq. 10).  A stage of one element has no freedom.
@@ -28,6 +31,8 @@ def add_lengths(block, grid, gamma):
     block.stage = Set(initialize=list(grid.stages), ordered=True)
     block.r = Var(block.element, bounds=(1 - gamma, None), initialize=1)
     mark(block, ARTIFICIAL, block.r, 1 + gamma)
+    if factors is not None:
+        block.sigma = Expression(block.element, initialize={e.n: factors[e.stage - 1] for e in grid.elements})
 
     @block.Constraint(block.stage)
     def stage_length(b, stage):
@@ -56,14 +61,14 @@ def check_orders(model, wrt):
 
 
 def multiply_derivatives(model, wrt, block, grid):
-    """Write r_n**k in front of the derivative in every discretisation equation."""
+    """Write (r_n sigma)**k in front of the derivative in every discretisation equation."""
     owner = grid.element_of()
     times = TimeIndex(wrt)
     for derivative, order, equations in discretisation_equations(model, wrt):
         for index, equation in equations.items():
-            r = block.r[owner[times.time(equation)].n]
+            rate = speed(block, owner[times.time(equation)])
             xdot = derivative[index]
-            scaled = r * xdot if order == 1 else r**order * xdot
+            scaled = rate * xdot if order == 1 else rate**order * xdot
             left, right = equation.expr.args
             if left is xdot:
                 equation.set_value(scaled == right)
@@ -75,3 +80,14 @@ def multiply_derivatives(model, wrt, block, grid):
 def element_length(block, element):
     """h_n as an expression, in labels of the ContinuousSet."""
     return element.length * block.r[element.n]
+
+
+def speed(block, element):
+    """Time of the plant in one unit of the labels, inside an element: r_n, or r_n sigma."""
+    sigma = block.component('sigma')
+    return block.r[element.n] if sigma is None else block.r[element.n] * sigma[element.n]
+
+
+def duration(block, element):
+    """h_n as an expression, in time of the plant."""
+    return element.length * speed(block, element)

@@ -10,7 +10,7 @@ from functools import cache
 from pyomo.core import Block, Expression
 from pyomo.dae import Integral
 
-from pyomo_fesd.elements.lengths import element_length
+from pyomo_fesd.elements.lengths import duration
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.records import rewriter
 
@@ -49,7 +49,7 @@ def rebuild(integral, rule, block, grid):
         index = index if isinstance(index, tuple) else (index,)
         before, after = index[: integral.loc], index[integral.loc :]
         total = sum(
-            element_length(block, e) * sum(b * rule(home, *before, t, *after) for b, t in zip(grid.weights, e.points))
+            duration(block, e) * sum(b * rule(home, *before, t, *after) for b, t in zip(grid.weights, e.points))
             for e in grid.elements
         )
         if integral.is_indexed():

@@ -6,7 +6,7 @@ Each function ``_remember_...`` notes one thing about the model and returns the 
 from contextlib import ExitStack, contextmanager
 
 from pyomo.common.collections import ComponentMap
-from pyomo.core import Block, Expression, Suffix
+from pyomo.core import Block, Expression, Param, Suffix, Var
 from pyomo.dae import DerivativeVar, Integral
 from pyomo.gdp import Disjunct
 
@@ -29,6 +29,7 @@ def restored_on_error(block, wrt):
         undo.callback(_remember_records(model))
         undo.callback(_remember_active(model))
         undo.callback(_remember_indices(model))
+        undo.callback(_remember_values(model))
         undo.callback(_remember_components(model))
         undo.callback(_remember_suffixes(model))
         yield
@@ -43,6 +44,22 @@ def _remember_suffixes(model):
             keep = ComponentMap((key, None) for key in known)
             for key in [key for key in suffix if key not in keep]:
                 del suffix[key]
+
+    return restore
+
+
+def _remember_values(model):
+    variables = [(v, v.value, v.stale, v.fixed) for v in model.component_data_objects(Var, descend_into=PLACES)]
+    params = (p for p in model.component_objects(Param, descend_into=PLACES) if p.mutable)
+    params = [(p, p._value) for family in params for p in family._data.values()]
+
+    def restore():
+        for v, value, stale, fixed in variables:
+            if v.value != value or v.fixed != fixed:
+                v.set_value(value, skip_validation=True)
+                v.stale, v.fixed = stale, fixed
+        for p, value in params:
+            p._value = value
 
     return restore
 

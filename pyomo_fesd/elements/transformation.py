@@ -6,19 +6,25 @@ from pyomo.core import Block, Transformation, TransformationFactory
 from pyomo.gdp import Disjunction
 
 from pyomo_fesd import marks, records
-from pyomo_fesd.elements.controls import check_controls, hold_controls
-from pyomo_fesd.elements.cross import (
-    FORMS,
-    add_cross_complementarity,
-    read_families,
-    sources,
-    warn_gauss_on_curved_surfaces,
-)
+from pyomo_fesd.elements.continuity import check_told, inner_label, read_continuity
+from pyomo_fesd.elements.controls import check_controls, fix_given, hold_controls
+from pyomo_fesd.elements.cross import FORMS, add_cross_complementarity, set_grid, sources
 from pyomo_fesd.elements.equilibration import MODES, add_equilibration
 from pyomo_fesd.elements.expansion import discretise
 from pyomo_fesd.elements.explicit_time import warn_explicit_time
-from pyomo_fesd.elements.grid import check_resolution, read_grid
+from pyomo_fesd.elements.families import (
+    conditions_over_time,
+    read_families,
+    refuse_lists_of_times,
+    warn_gauss_on_curved_surfaces,
+)
+from pyomo_fesd.elements.free_time import check_free_time, factors
+from pyomo_fesd.elements.grid import check_resolution, read_grid, share_elements
+from pyomo_fesd.elements.jumps import add_jumps, read_jumps, start_after_jumps
 from pyomo_fesd.elements.lengths import add_lengths, check_orders, multiply_derivatives
+from pyomo_fesd.elements.memory import add_memory, read_modes
+from pyomo_fesd.elements.mixed import split_mixed
+from pyomo_fesd.elements.moves import add_moves
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
 from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.errors import FesdError
@@ -33,8 +39,18 @@ def _gamma(arg):
     return gamma
 
 
+def _numbers(arg):
+    """A positive integer, or a list of them."""
+    return [PositiveInt(n) for n in arg] if isinstance(arg, (list, tuple)) else PositiveInt(arg)
+
+
 def _components(arg):
     return list(arg) if isinstance(arg, (list, tuple)) else [arg]
+
+
+def _lengths(arg):
+    """Vars in the order of the stages, from a list or an indexed Var."""
+    return None if arg is None else list(arg.values() if hasattr(arg, 'values') else arg)
 
 
 def _active_disjunctions(block, wrt):
@@ -50,10 +66,12 @@ class FiniteElements(Transformation):
 
     pyomo.dae discretises; then every discretisation equation gets the multiplier r_n = h_n/hbar_n, the complementarities over
     time are aggregated over each element (eq. 11), and step equilibration ties the lengths where nothing switches (eq. 13).
-    Where the complementarities come from does not matter: ``fesd.dcs``, or the user's own ``Complementarity`` over time.
+    Where the complementarities come from does not matter: ``fesd.dcs``, or the user's own ``Complementarity`` over time; one with
+    two bounds on one side becomes two pairs.
 
     The points that the ContinuousSet has before are boundaries of control stages: they keep their physical time, and each
-    stage gets the same number of elements.  On a model that is discretised already, the present grid is made movable.
+    stage gets the same number of elements, unless ``nfe`` lists others.  The final time, or the length of each stage, may be a
+    variable.  On a model that is discretised already, the present grid is made movable.
 
     Raises
     ------
@@ -66,7 +84,12 @@ class FiniteElements(Transformation):
     CONFIG = ConfigDict('fesd.finite_elements')
     CONFIG.declare('wrt', ConfigValue(description="the ContinuousSet of time; may be left out if there is only one"))
     CONFIG.declare(
-        'nfe', ConfigValue(default=10, domain=PositiveInt, description="number of finite elements, all stages together")
+        'nfe',
+        ConfigValue(
+            default=10,
+            domain=_numbers,
+            description="number of finite elements, all stages together; or a list with one number for each stage",
+        ),
     )
     CONFIG.declare('ncp', ConfigValue(default=3, domain=PositiveInt, description="collocation points in each element (K)"))
     CONFIG.declare(
@@ -108,7 +131,11 @@ class FiniteElements(Transformation):
     )
     CONFIG.declare(
         'piecewise_constant',
-        ConfigValue(default=[], domain=_components, description="controls (Vars over time) held constant on each stage"),
+        ConfigValue(
+            default=[],
+            domain=_components,
+            description="inputs (Vars or mutable Params over time) that are constant on each stage; the value at its end counts",
+        ),
     )
     CONFIG.declare(
         'continuous',
@@ -117,6 +144,17 @@ class FiniteElements(Transformation):
             domain=_components,
             description="algebraic Vars over time that are continuous although no equation says so; states need not be named",
         ),
+    )
+    CONFIG.declare(
+        'final_time',
+        ConfigValue(
+            default=None,
+            description="a Var: how long the horizon lasts, whatever its labels; the plant stays written in its own time",
+        ),
+    )
+    CONFIG.declare(
+        'stage_lengths',
+        ConfigValue(default=None, domain=_lengths, description="the same for each control stage: one Var for each"),
     )
     CONFIG.declare(
         'stages',
@@ -133,30 +171,38 @@ class FiniteElements(Transformation):
         wrt = find_continuous_set(instance, config.wrt, 'fesd.finite_elements')
         self._check(instance, wrt, config)
         with restored_on_error(instance, wrt):
-            stages = self._discretise(instance, wrt, config)
+            stages, times = self._discretise(instance, wrt, config), TimeIndex(wrt)
             grid = read_grid(wrt, stages)
+            fix_given(config.piecewise_constant, grid, wrt)
+            records.repeat(instance, wrt)
             check_orders(instance.model(), wrt)
+            sigma = factors(config.final_time, config.stage_lengths, stages)
             block = self._block(instance, wrt)
-            add_lengths(block, grid, config.length_bounds)
+            set_grid(block, grid)
+            add_lengths(block, grid, config.length_bounds, sigma)
             integrands = [(i, integrand(i, wrt)) for i in integrals(instance.model(), wrt)]
             for integral, rule in integrands:
                 # first of all: functions in pieces inside an integrand have conditions of their own
                 rebuild(integral, rule, block, grid)
-            families = read_families(instance, wrt, config.piecewise_constant, config.continuous)
-            waiting = next(_active_disjunctions(instance, wrt), None)
-            if waiting is not None and not families:
-                raise FesdError(
-                    waiting, "an active Disjunction over time", "apply fesd.dcs first: its complementarity finds the switches"
-                )
             warn_explicit_time(instance, wrt, grid, integrands)
+
+            pairs, mixed = conditions_over_time(instance, times)
+            modes, jumps = read_modes(instance.model(), wrt), read_jumps(instance.model(), wrt)
+            self._refuse_waiting(instance, wrt, pairs or mixed or modes or jumps)
+            continuity = self._continuity(instance, times, [*pairs.values(), *mixed.values()], grid, config)
+            families = read_families(pairs | split_mixed(mixed, continuity, times), continuity, times)
             if not grid.right_is_stage:
-                warn_gauss_on_curved_surfaces(families)
+                warn_gauss_on_curved_surfaces(families, continuity, times)
 
             hold_controls(block, config.piecewise_constant, grid, wrt)
             multiply_derivatives(instance.model(), wrt, block, grid)
+            add_jumps(block, jumps, grid, wrt)
+            families = start_after_jumps(block, families, jumps, grid, wrt)
+            add_memory(block, modes, grid, wrt)
             add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
-            if families:
-                add_equilibration(block, families, grid, config.equilibration, config.rho)
+            if families or modes or jumps:
+                add_equilibration(block, families, modes, grid, config.equilibration, config.rho)
+                add_moves(block, families, modes, jumps, grid)
             else:
                 block.r.fix(1)
 
@@ -165,30 +211,41 @@ class FiniteElements(Transformation):
         if wrt in records.records(instance).grids:
             raise FesdError(wrt, "its elements are movable already", "apply fesd.finite_elements once for each ContinuousSet")
         check_controls(config.piecewise_constant, wrt)
+        check_told(config.continuous, config.piecewise_constant, wrt)
+        check_free_time(config.final_time, config.stage_lengths, wrt)
+        refuse_lists_of_times(instance, TimeIndex(wrt))
         if discretised(wrt):
             return
         if config.stages is not None:
             raise FesdError(
                 wrt, "stages= was given for a set that is not discretised yet", "put the stage boundaries into the ContinuousSet"
             )
-        stages = len(wrt) - 1
-        if config.nfe % stages:
+        check_resolution(wrt, share_elements(wrt, config.nfe), config.ncp)
+
+    @staticmethod
+    def _refuse_waiting(instance, wrt, conditions):
+        """A Disjunction that nobody transformed would hold nothing; beside other conditions it may be there on purpose."""
+        waiting = next(_active_disjunctions(instance, wrt), None)
+        if waiting is not None and not conditions:
             raise FesdError(
-                wrt,
-                f"nfe={config.nfe} elements cannot be shared equally among {stages} control stages",
-                f"take a multiple of {stages}",
+                waiting, "an active Disjunction over time", "apply fesd.dcs first: its complementarity finds the switches"
             )
-        check_resolution(wrt, config.nfe, config.ncp)
+
+    @staticmethod
+    def _continuity(instance, times, families, grid, config):
+        """What is continuous where the families begin, by the equations there if they can matter."""
+        labels = {inner_label(family, times.wrt) for family in families}
+        written = not all(marks.is_generated(condition) for family in families for condition in family.values())
+        trace = written or (bool(families) and (len(grid.stages) > 1 or not grid.right_is_stage))
+        return read_continuity(instance.model(), times, labels, config.piecewise_constant, config.continuous, trace)
 
     @staticmethod
     def _discretise(instance, wrt, config):
-        """Lay the grid if there is none, finish what waited for it; return the stage boundaries."""
+        """Lay the grid if there is none; return the stage boundaries."""
         if discretised(wrt):
-            stages = sorted({wrt.first(), wrt.last(), *(config.stages or ())})
-        else:
-            stages = list(wrt)
-            discretise(instance, wrt, config.nfe, config.ncp, config.scheme)
-        records.repeat(instance, wrt)
+            return sorted({wrt.first(), wrt.last(), *(config.stages or ())})
+        stages, shares = list(wrt), share_elements(wrt, config.nfe)
+        discretise(instance, wrt, shares, config.ncp, config.scheme, config.piecewise_constant)
         return stages
 
     @staticmethod
@@ -204,5 +261,5 @@ class FiniteElements(Transformation):
         return sources(pair.parent_block())[pair]
 
     def get_element_lengths(self, wrt):
-        """The length multipliers r_n = h_n/hbar_n (an IndexedVar over 1..N) of a moving grid."""
+        """The length multipliers r_n = h_n/hbar_n (an IndexedVar over 1..N) of a moving grid, both lengths in labels."""
         return records.records(wrt).grids[wrt].r

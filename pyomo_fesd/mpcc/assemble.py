@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 from pyomo.core import maximize
 
-from pyomo_fesd.mpcc.compiled import Compiled, Numbers, csr
+from pyomo_fesd.mpcc.compiled import Compiled, Move, Numbers, csr
 from pyomo_fesd.mpcc.layout import Layout
 from pyomo_fesd.mpcc.parameters import parameter_values
 from pyomo_fesd.mpcc.scaling import Scale, side_factors
@@ -33,7 +33,7 @@ def assemble(problem, entries, nl, handles, factors):
     graph = ca.Function('mpcc', [w, p], _outputs(layout, f, own, stack, S, scale))
     guide = np.array([problem.artificial.get(v.parent_component(), np.inf) for v in variables], dtype=float)
     source = Source(variables, handles.parameters, _are_sides(sides, layout), guide, s_x, entries.splits)
-    numbers = _numbers(problem, nl, layout, sides, scale, source)
+    numbers = _numbers(problem, nl, layout, sides, scale, source, conditions, variables)
     return Compiled(graph, numbers, variables, constraints, conditions, problem.decisions, source)
 
 
@@ -87,7 +87,25 @@ def _are_sides(sides, layout):
     return among[layout.free]
 
 
-def _numbers(problem, nl, layout, sides, scale, source):
+def _moves(problem, conditions, variables, s_x):
+    """``problem.moves`` in terms of the places that the pairs have."""
+    places = {}
+    for k, condition in enumerate(conditions):
+        places.setdefault(id(condition.source), []).append(k)
+    columns = {id(v): j for j, v in enumerate(variables)} if problem.moves else {}
+    found = []
+    for move in problem.moves:
+        both = [ends for one, other in move for ends in zip(places.get(id(one), ()), places.get(id(other), ()))]
+        if both:
+            targets, sources = zip(*both)
+            short = [columns[id(v)] for v, at in move if id(v) in columns and at is True]
+            starts = {columns[id(v)]: at for v, at in move if id(v) in columns and at is not True}
+            indices = [np.array(list(ends), dtype=int) for ends in (targets, sources, short, starts)]
+            found.append(Move(*indices, np.array(list(starts.values())) * s_x[indices[-1]]))
+    return found
+
+
+def _numbers(problem, nl, layout, sides, scale, source, conditions, variables):
     """The ``Numbers`` of ``problem``; ``sides`` are addresses."""
     return Numbers(
         lbg=nl.lbg[layout.own] * scale.g,
@@ -96,5 +114,6 @@ def _numbers(problem, nl, layout, sides, scale, source):
         sign=-1.0 if problem.objective is not None and problem.objective.sense == maximize else 1.0,
         has_objective=problem.objective is not None,
         scale=scale,
+        moves=_moves(problem, conditions, variables, scale.x),
         **source.read(),
     )

@@ -130,4 +130,3 @@ class Branch:
         if np.count_nonzero(equations) > np.count_nonzero(~fixed):
             lbg[equations] -= ROW_TOLERANCE
             ubg[equations] += ROW_TOLERANCE
-

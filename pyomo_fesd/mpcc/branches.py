@@ -30,6 +30,8 @@ FAR = 1e3
 #: A feasible point with variables beyond this and a negative objective has run away along an unbounded one; with a positive one
 #: it only started where a relaxation had run away to.
 UNBOUNDED = 1e15
+#: A variable nearer to its lower bound than this is at it.
+SHORT = 1e-6
 
 
 class Branches:
@@ -80,6 +82,23 @@ class Branches:
     def explore_from(self, w, final):
         """Solve the branch that the values ``w`` name."""
         self._improve_from(self._point(w, active_sets(*self._sides(w), self._tolerances.biactive).zero, None, final), final)
+
+    def move(self):
+        """Look at the branches next to the incumbent that the model names, as long as one of them is better."""
+        moves = list(self._c.moves)
+        while moves:
+            point, move = self.run.point, moves.pop(0)
+            zero = active_sets(*self._sides(point.w), self._tolerances.biactive).zero
+            beside = zero.copy()
+            beside[move.targets] = zero[move.sources]
+            if move.short.size and np.all(point.w[move.short] > self._c.lbx[move.short] + SHORT):
+                continue
+            if not np.array_equal(beside, zero) and not self.tried(beside):
+                start = point.w.copy()
+                start[move.starts] = move.at
+                self._improve_from(self._point(start, beside, None, True), False)
+                if self.run.point.f < point.f - PROGRESS * max(1.0, abs(point.f)):
+                    moves = list(self._c.moves)
 
     def search(self, *starts):
         """Look for any feasible branch: by the LPEC with every pair as a binary, and depth first over the pairs."""

@@ -5,7 +5,7 @@ the model.
 A ``Compiled`` can be pickled and sent to another process: the casadi graph goes along, the Pyomo components do not.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import casadi as ca
@@ -43,6 +43,7 @@ class Numbers:
     sign : +1.0, or -1.0 for a model that maximises (f is always minimised)
     has_objective : bool
     scale : Scale
+    moves : list of Move
     """
 
     lbx: np.ndarray
@@ -58,6 +59,30 @@ class Numbers:
     sign: float
     has_objective: bool
     scale: object
+    moves: list = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Move:
+    """A branch next to a solution that no small step reaches: some pairs take over the zero sides of others.
+
+    Attributes
+    ----------
+    targets, sources : int arrays
+        pairs
+    short : int array
+        variables; unless one of them is at its lower bound the move is not worth a look (none: always)
+    starts : int array
+        variables that start elsewhere
+    at : array
+        where
+    """
+
+    targets: np.ndarray
+    sources: np.ndarray
+    short: np.ndarray
+    starts: np.ndarray
+    at: np.ndarray
 
 
 class Compiled:

@@ -71,6 +71,8 @@ class HybridSolver:
         """The whole algorithm."""
         if not (self._options.warm_start and self._from_values()):
             self._path(self._c.x0, self._branches).follow()
+            if self.run.point is not None and self._c.has_objective:
+                self._branches.move()
         if self.run.point is None:
             self._last_resort()
         point = self.run.point

@@ -240,4 +240,3 @@ def lagrangian_gradient(x, p, f, g):
     """Function (x, p, lam_g) -> gradient of ``f + lam_g g`` by x."""
     lam = ca.SX.sym('lam', g.numel())
     return ca.Function('gradient', [x, p, lam], [ca.densify(ca.gradient(f + ca.dot(lam, g), x))])
-

@@ -23,6 +23,10 @@ REFUSED = {
 }
 
 
+#: Marks that only moving elements can give their meaning.
+UNDONE = {marks.MEMORY: "a mode with memory", marks.GUARD: "a state jump"}
+
+
 @dataclass(frozen=True)
 class Condition:
     """One scalar pair 0 <= G perp H >= 0, with the component that it came from."""
@@ -68,6 +72,8 @@ class Mpcc:
     penalties : list of (Expression, float)
     artificial : ComponentMap Var -> float
         variables whose bounds belong to the method, with their upper bound in the homotopy
+    moves : list of lists of (component, value)
+        marks MOVE, those of one move together
     objective : ObjectiveData or None
     sources : list of ComplementarityData
         every active condition
@@ -79,6 +85,7 @@ class Mpcc:
     decisions: list = field(default_factory=list)
     penalties: list = field(default_factory=list)
     artificial: object = field(default_factory=ComponentMap)
+    moves: list = field(default_factory=list)
     objective: object = None
     sources: list = field(default_factory=list)
 
@@ -105,6 +112,7 @@ def read_problem(model):
             problem.conditions.append(Condition(source, *condition))
     problem.penalties = list(marks.marked(model, marks.PENALTY))
     problem.artificial = ComponentMap(marks.marked(model, marks.ARTIFICIAL))
+    problem.moves = [list(suffix.items()) for suffix in marks.suffixes(model, marks.MOVE)]
     return problem
 
 
@@ -118,6 +126,11 @@ def _refuse(model):
             raise FesdError(
                 v, "an integer variable", "fix it, or relax its domain: mpec_hybrid decides complementarities, not integers"
             )
+
+    for name, what in UNDONE.items():
+        found = next(marks.marked(model, name), None)
+        if found is not None:
+            raise FesdError(found[0], f"{what} on a grid whose elements do not move", "apply fesd.finite_elements first")
 
 
 def _objective(model):

@@ -5,9 +5,8 @@ from pyomo.common.collections import ComponentMap
 from pyomo.contrib.solver.common.results import SolutionStatus, TerminationCondition
 from pyomo.contrib.solver.common.solution_loader import SolutionLoader
 from pyomo.contrib.solver.common.util import NoDualsError, NoReducedCostsError, NoSolutionError
-from pyomo.core import value
 
-from pyomo_fesd import marks
+from pyomo_fesd.indicators import set_indicators
 from pyomo_fesd.mpcc.run import Outcome
 
 #: What each outcome is in Pyomo's words.
@@ -126,9 +125,7 @@ class Loader(SolutionLoader):
 
     def load_vars(self, vars_to_load=None):
         super().load_vars(vars_to_load)
-        for disjunct, weight in marks.marked(self._pyomo_model, marks.INDICATOR):
-            # Pyomo's own link: near 0 or 1 it sets the Boolean, between it leaves it unset
-            disjunct.binary_indicator_var.set_value(value(weight, exception=False), skip_validation=True)
+        set_indicators(self._pyomo_model)
 
 
 def _select(kind, components, numbers, wanted):

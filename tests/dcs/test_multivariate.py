@@ -144,8 +144,8 @@ def test_the_value_is_continuous_in_time():
     m.z = pyo.Var(m.t)
     m.other = pyo.Constraint(m.t, rule=lambda m, t: m.z[t] == m.f(m.x[t], m.y[t]))
     dcs(collocate(m))
-    t = m.t[2]
-    assert read_continuity(m, TimeIndex(m.t), (), [], trace=True).holds(m.z[t])
+    t = m.t.at(2)
+    assert read_continuity(m, TimeIndex(m.t), {t}, (), [], trace=True).holds(m.z[t])
 
 
 # Whole paths

@@ -136,14 +136,25 @@ def test_reading_regions_leaves_values_and_stale_flags_alone():
 
 # Three and more modes
 
+#: The forms for any number of modes, with what they count: regions and switching functions.
+MANY_MODES = pytest.mark.parametrize('form', ['stewart', 'heaviside'])
 
-def test_three_ordered_modes_with_a_ranged_inequality_get_three_regions():
-    m = dcs(thresholds())
-    assert list(m._pyomo_fesd_dcs.component_map()) == ['level_stewart_3']
+
+def size(m):
+    """What the only form of a model counts: the number at the end of its block's name."""
+    (name,) = m._pyomo_fesd_dcs.component_map()
+    return int(name.split('_')[-1])
+
+
+@pytest.mark.parametrize('form, number', [('stewart', 3), ('heaviside', 2)])
+def test_three_ordered_modes_with_a_ranged_inequality_get_three_regions_or_two_steps(form, number):
+    m = dcs(thresholds(), form=form)
+    assert size(m) == number
     assert modes_at(m, (-0.5, 0), (0.5, 0), (1.5, 0), disjunction='level') == [[0], [1], [2]]
 
 
-def test_a_full_sign_matrix_gives_the_same_regions_as_an_ordered_one():
+@MANY_MODES
+def test_a_full_sign_matrix_gives_the_same_regions_as_an_ordered_one(form):
     short, full = thresholds(), scalar_ode()
     add_modes(
         full,
@@ -152,18 +163,19 @@ def test_a_full_sign_matrix_gives_the_same_regions_as_an_ordered_one():
         lambda m, t: [0 <= m.x[t], m.x[t] - 1 >= 0, m.dx[t] == 1],
         name='level',
     )
-    assert len(generated(dcs(full), pyo.Constraint)) == len(generated(dcs(short), pyo.Constraint))
+    assert len(generated(dcs(full, form=form), pyo.Constraint)) == len(generated(dcs(short, form=form), pyo.Constraint))
     for m in (short, full):
         assert modes_at(m, (-0.5, 0), (0.5, 0), (1.5, 0), disjunction='level') == [[0], [1], [2]]
 
 
+@MANY_MODES
 @pytest.mark.parametrize('scale', [1e-9, 1e-6, 1.0, 1e8])
-def test_thresholds_may_be_of_any_size(scale):
+def test_thresholds_may_be_of_any_size(scale, form):
     m = thresholds(low=scale, high=2 * scale)
     m.x[...].set_value(scale)
-    dcs(m)
+    dcs(m, form=form)
     states = [(0.5 * scale, 0), (1.5 * scale, 0), (2.5 * scale, 0)]
-    assert list(m._pyomo_fesd_dcs.component_map()) == ['level_stewart_3']
+    assert size(m) == {'stewart': 3, 'heaviside': 2}[form]
     assert modes_at(m, *states, disjunction='level', tolerance=1e-3 * min(scale, 1)) == [[0], [1], [2]]
 
 
@@ -171,36 +183,40 @@ def test_thresholds_may_be_of_any_size(scale):
 def test_thresholds_may_lie_far_from_the_initial_value(low, high):
     m = thresholds(low=low, high=high)
     m.x[...].set_value(1.0)
-    dcs(m)
-    assert list(m._pyomo_fesd_dcs.component_map()) == ['level_stewart_3']
+    dcs(m, form='stewart')
+    assert size(m) == 3
 
 
-def test_close_thresholds_far_from_zero_are_told_apart():
+@MANY_MODES
+def test_close_thresholds_far_from_zero_are_told_apart(form):
     # 100 Pa between two switching pressures of 1 MPa
     m = thresholds(low=1e6, high=1e6 + 100)
     m.x[...].set_value(9e5)
-    dcs(m)
+    dcs(m, form=form)
     assert modes_at(m, (1e6 - 50, 0), (1e6 + 50, 0), (1e6 + 150, 0), disjunction='level') == [[0], [1], [2]]
 
 
-def test_four_thresholds_leave_only_the_patterns_that_can_occur():
+@pytest.mark.parametrize('form, number', [('stewart', 5), ('heaviside', 4)])
+def test_four_thresholds_leave_only_the_patterns_that_can_occur(form, number):
     m = scalar_ode()
     limits = [0, 1, 2, 3]
     between = [lambda m, t, a=a, b=b: [pyo.inequality(a, m.x[t], b), m.dx[t] == a] for a, b in pairwise(limits)]
     add_modes(m, lambda m, t: [m.x[t] <= 0, m.dx[t] == -1], *between, lambda m, t: [m.x[t] >= 3, m.dx[t] == 3])
-    dcs(m)
-    assert list(m._pyomo_fesd_dcs.component_map()) == ['sgn_stewart_5']
+    dcs(m, form=form)
+    assert size(m) == number
     assert modes_at(m, *((x, 0) for x in (-0.5, 0.5, 1.5, 2.5, 3.5))) == [[0], [1], [2], [3], [4]]
 
 
-def test_a_mode_may_leave_a_sign_open():
-    m = dcs(quadrants())
+@MANY_MODES
+def test_a_mode_may_leave_a_sign_open(form):
+    m = dcs(quadrants(), form=form)
     found = modes_at(m, (-1, 1), (-1, -1), (1, 1), (1, -1), disjunction='corner')
     assert found == [[0], [0], [1], [2]]
 
 
+@pytest.mark.parametrize('form, number', [('stewart', 4), ('heaviside', 2)])
 @pytest.mark.parametrize('x0', [1e7, 1.0])
-def test_modes_with_open_signs_in_different_units_of_measurement_keep_all_their_regions(x0):
+def test_modes_with_open_signs_in_different_units_of_measurement_keep_all_their_regions(x0, form, number):
     # 1e7 Pa and a mole fraction of 1e-6
     m = scalar_ode(x0=x0)
     m.y[...].set_value(1e-6)
@@ -210,11 +226,12 @@ def test_modes_with_open_signs_in_different_units_of_measurement_keep_all_their_
         lambda m, t: [m.x[t] >= 1e7, m.y[t] >= 1e-6, m.dx[t] == 1],
         lambda m, t: [m.x[t] >= 1e7, m.y[t] <= 1e-6, m.dx[t] == 2],
     )
-    dcs(m)
-    assert list(m._pyomo_fesd_dcs.component_map()) == ['sgn_stewart_4']
+    dcs(m, form=form)
+    assert size(m) == number
 
 
-def test_the_number_of_regions_follows_each_index():
+@pytest.mark.parametrize('form', ['auto', 'stewart'])
+def test_the_number_of_regions_follows_each_index(form):
     m = scalar_ode()
     m.i = pyo.Set(initialize=['two', 'three'])
 
@@ -228,7 +245,7 @@ def test_the_number_of_regions_follows_each_index():
             [m.y[t] >= 1, m.dy[t] == 1],
         ]
 
-    dcs(m)
+    dcs(m, form=form)
     m.x[0].value, m.y[0].value = 1.0, 0.5
     assert modes_on(m.unit['two', 0]) == [m.unit['two', 0].disjuncts[1]]
     assert modes_on(m.unit['three', 0]) == [m.unit['three', 0].disjuncts[1]]

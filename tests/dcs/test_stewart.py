@@ -29,14 +29,14 @@ from tests.models import (
 
 
 def test_three_modes_cost_seven_variables_five_equations_and_three_pairs_a_time():
-    m = dcs(thresholds())
+    m = dcs(thresholds(), form='stewart')
     sizes = [len(generated(m, ctype)) for ctype in (pyo.Var, pyo.Constraint, Complementarity)]
     assert sizes == [7 * len(m.t), 5 * len(m.t), 3 * len(m.t)]
 
 
 @pytest.mark.parametrize('x, dx', [(-1.0, 3), (0.25, 2), (4.0, 1)])
 def test_each_interval_has_its_own_rate(x, dx):
-    m = dcs(thresholds())
+    m = dcs(thresholds(), form='stewart')
     m.x[0].value = x
     assert len(modes_on(m.level[0])) == 1
     assert rate(m.level[0], m.dx[0]) == pytest.approx(dx)
@@ -44,7 +44,7 @@ def test_each_interval_has_its_own_rate(x, dx):
 
 def test_lam_is_the_distance_of_g_from_its_minimum():
     # g = -S c with c = (x, x - 1), or the negative of either: (2x - 1, -1, 1 - 2x)
-    m = dcs(thresholds())
+    m = dcs(thresholds(), form='stewart')
     m.x[0].value = 0.25
     put_on(m.level[0], 2)
     block, _ = form_of(m.level[0])
@@ -53,13 +53,13 @@ def test_lam_is_the_distance_of_g_from_its_minimum():
 
 
 def test_on_a_threshold_only_its_two_neighbours_can_be_on():
-    m = dcs(thresholds())
+    m = dcs(thresholds(), form='stewart')
     m.x[0].value = 1.0
     assert modes_on(m.level[0]) == m.level[0].disjuncts[1:]
 
 
 def test_the_multipliers_of_all_modes_sum_up_to_one():
-    m = dcs(thresholds())
+    m = dcs(thresholds(), form='stewart')
     put_on(m.level[0], 1)
     block, _ = form_of(m.level[0])
     assert violation(m.level[0]) == pytest.approx(0)
@@ -68,7 +68,7 @@ def test_the_multipliers_of_all_modes_sum_up_to_one():
 
 
 def test_a_mode_with_an_open_sign_is_on_with_the_sum_of_its_regions():
-    m = dcs(quadrants())
+    m = dcs(quadrants(), form='stewart')
     m.x[0].value, m.y[0].value = -1.0, 0.0  # between the two regions of 'left'
     left = m.corner[0].disjuncts[0]
     assert modes_on(m.corner[0]) == [left]
@@ -83,7 +83,7 @@ def test_a_mode_with_an_open_sign_is_on_with_the_sum_of_its_regions():
 
 
 def test_the_multipliers_start_at_the_initial_state():
-    m = dcs(thresholds())
+    m = dcs(thresholds(), form='stewart')
     block, _ = form_of(m.level[0])
     start = [block.lam[0, i].value for i in block.regions]
     put_on(m.level[0], 1)
@@ -91,12 +91,12 @@ def test_the_multipliers_start_at_the_initial_state():
 
 
 def test_the_multipliers_are_bounded():
-    block, _ = form_of(dcs(thresholds()).level[0])
+    block, _ = form_of(dcs(thresholds(), form='stewart').level[0])
     assert [block.nu[0, 1].bounds, block.lam[0, 1].bounds, block.mu[0].bounds] == [(0, 1), (0, None), (None, None)]
 
 
 def test_continuous_multipliers_and_independent_selectors_are_marked_for_the_elements():
-    m = dcs(thresholds())
+    m = dcs(thresholds(), form='stewart')
     block, _ = form_of(m.level[0])
     continuous = [v for v, _ in marks.marked(m, marks.CONTINUOUS)]
     assert len(continuous) == 2 and all(any(v is part for part in (block.lam, block.mu)) for v in continuous)
@@ -158,7 +158,7 @@ def corners(draw):
 @given(corners())
 def test_inside_a_region_only_its_own_mode_is_on_with_its_own_rates(system):
     functions, modes, (x, y), x0 = system
-    m = dcs(planar(functions, modes, x0=x0))
+    m = dcs(planar(functions, modes, x0=x0), form='stewart')
     assert list(m._pyomo_fesd_dcs.component_map()) == ['sgn_stewart_4']
     m.x[0].value, m.y[0].value = x, y
     number = owner(functions, modes, x, y)

@@ -31,6 +31,7 @@ from tests.models import (
     snapshot,
     tank,
     thresholds,
+    turn_on,
     units,
     values_of_generated,
 )
@@ -408,7 +409,7 @@ def test_every_generated_equation_and_condition_knows_its_disjunction(style):
 
 @pytest.mark.parametrize('build, name', [(signum, 'sgn'), (thresholds, 'level')], ids=['two modes', 'three modes'])
 def test_every_condition_knows_its_disjunct(build, name):
-    m = dcs(build())
+    m = dcs(build(), form='auto' if build is signum else 'stewart')
     for t in m.t:
         disjunction = m.component(name)[t]
         block, _ = form_of(disjunction)
@@ -455,12 +456,13 @@ def test_a_disjunct_that_was_not_transformed_has_no_images():
     assert len(fesd_dcs.get_multipliers(m.sgn[0])) == 0
 
 
+@pytest.mark.parametrize('form', ['auto', 'stewart', 'heaviside'])
 @pytest.mark.parametrize('build, name', [(signum, 'sgn'), (thresholds, 'level')], ids=['two modes', 'three modes'])
-def test_the_multipliers_tell_which_mode_is_on(build, name):
-    m = dcs(build())
+def test_the_multipliers_tell_which_mode_is_on(build, name, form):
+    m = dcs(build(), form=form)
     disjunction = m.component(name)[0]
-    for i, disjunct in enumerate(disjunction.disjuncts):
-        put_on(disjunction, i + 1)
+    for disjunct in disjunction.disjuncts:
+        turn_on(disjunction, disjunct)
         values = [pyo.value(nu) for nu in fesd_dcs.get_multipliers(disjunction).values()]
         assert values == [float(d is disjunct) for d in disjunction.disjuncts]
 
@@ -507,11 +509,7 @@ def with_content(declare):
     return build
 
 
-def nested_disjunction(m, d, t):
-    d.inner = Disjunction(expr=[[m.y[t] <= 0], [m.y[t] >= 0]])
-
-
-def nested_disjunct(m, d, t):
+def lonely_disjunct(m, d, t):
     d.inner = Disjunct()
 
 
@@ -598,14 +596,8 @@ BAD = {
         'same variables',
     ),
     'xor=False': (inclusive_or, 'sgn[0]', 'xor=False'),
-    'a LogicalConstraint over time': (
-        with_component('logic', lambda m: pyo.LogicalConstraint(m.t, rule=lambda m, t: m.below[t].indicator_var)),
-        'logic[0]',
-        'LogicalConstraint',
-    ),
     'a BooleanVar over time': (with_component('flag', lambda m: pyo.BooleanVar(m.t)), 'flag[0]', 'BooleanVar'),
-    'a nested Disjunction': (with_content(nested_disjunction), 'above[0]', 'another Disjunction'),
-    'a nested Disjunct': (with_content(nested_disjunct), 'above[0]', 'another Disjunct'),
+    'a Disjunct in a disjunct without its Disjunction': (with_content(lonely_disjunct), 'above[0]', 'belongs to no'),
     'a LogicalConstraint in a disjunct': (with_content(logic_inside), 'above[0]', 'LogicalConstraint'),
     'a Complementarity in a disjunct': (with_content(complementarity_inside), 'above[0]', 'Complementarity'),
     'a DerivativeVar in a disjunct': (with_content(derivative_inside), 'above[0].dz', 'DerivativeVar'),

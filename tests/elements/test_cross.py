@@ -6,15 +6,15 @@ import pyomo.environ as pyo
 import pytest
 import signum
 from pyomo.core.expr.visitor import identify_variables
+from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
-from pyomo_fesd import FesdError
 from pyomo_fesd.complementarity import read
 from pyomo_fesd.timeindex import TimeIndex
 from tests.models import dcs
 from tests.problems import relay_of_states, setpoint, sliding, weir
-from tests.problems.running import EXACT_SCHEMES, LEGENDRE, RADAU, SCHEMES, move, run, seen, solve, transform
+from tests.problems.running import EXACT_SCHEMES, LEGENDRE, RADAU, SCHEMES, move, run, solve, transform
 
 FORMS = ('element', 'stage', 'full')
 
@@ -153,16 +153,6 @@ def test_a_condition_that_is_switched_off_at_some_times_takes_no_part_there():
     assert list(block(m).cross) == [('overflow', 1), ('overflow', 3), ('overflow', 4)]
 
 
-def test_two_bounds_on_one_side_over_time_are_refused():
-    m = weir.build()
-    m.z = pyo.Var(m.t, bounds=(0, 1))
-    m.valve = Complementarity(m.t, rule=lambda m, t: complements(pyo.inequality(0, m.z[t], 1), m.V[t] - 0.5))
-    before = seen(m)
-    with pytest.raises(FesdError, match=r'^valve\[0\]: .*two bounds on one side is not supported yet'):
-        move(m, 3)
-    assert seen(m) == before
-
-
 # Which points take part
 
 
@@ -189,6 +179,24 @@ def test_a_multiplier_that_jumps_with_a_control_does_not_reach_into_the_next_sta
     for m, expected in ((smooth, [1, 1.5]), (held, [1.5])):
         p = m.component('_pyomo_fesd_dcs').regulator.p
         pair = block(m).cross['regulator.complementarity[2]', 3]
+        assert labels_of(read(pair).H, p) == expected
+
+
+def test_of_several_switching_functions_only_those_with_a_held_control_jump_at_stages():
+    m = setpoint.build()
+    del m.regulator, m.regulator_disjuncts
+    m.regulator = Disjunction(
+        m.t,
+        rule=lambda m, t: [
+            [m.x[t] <= 5, m.dx[t] == 1],
+            [m.x[t] >= 5, m.x[t] <= m.u[t], m.dx[t] == 2],
+            [m.x[t] >= 5, m.x[t] >= m.u[t], m.dx[t] == 3],
+        ],
+    )
+    transform(m, 4, 1, form='heaviside', piecewise_constant=[m.u])
+    p = m.component('_pyomo_fesd_dcs').regulator_heaviside_2.p
+    for function, expected in ((1, [(1, 1), (1.5, 1)]), (2, [(1.5, 2)])):
+        pair = block(m).cross[f'regulator_heaviside_2.complementarity[{2 * function}]', 3]
         assert labels_of(read(pair).H, p) == expected
 
 

@@ -30,7 +30,7 @@ def states(points=(0, 2)):
 
 def expand(m, nfe=3, ncp=2, scheme=RADAU):
     """Discretise without making anything movable; returns the model."""
-    discretise(m, m.t, nfe, ncp, scheme)
+    discretise(m, m.t, [nfe], ncp, scheme)
     return m
 
 
@@ -100,6 +100,20 @@ def test_a_disjunction_with_further_indices_gets_all_combinations():
     assert texts(m.high['b', m.t.at(2)]) == [f'1  <=  x[{m.t.at(2)}]']
 
 
+def test_a_logical_constraint_over_time_gets_every_new_time_by_its_rule():
+    m = signum.build()
+    m.i = pyo.Set(initialize=['a', 'b'])
+    literals = {'a': lambda m, t: m.below[t].indicator_var, 'b': lambda m, t: m.sgn[t].disjuncts[1].indicator_var}
+    m.logic = pyo.LogicalConstraint(
+        m.i, m.t, rule=lambda m, i, t: pyo.LogicalConstraint.Skip if t == 0 else literals[i](m, t).lor(m.above[t].indicator_var)
+    )
+    expand(m)
+    assert set(m.logic) == {(i, t) for i in m.i for t in m.t if t != 0}
+    assert m.logic.ctype is pyo.LogicalConstraint and all(c.active for c in m.logic.values())
+    t = m.t.at(2)
+    assert str(m.logic['a', t].expr) == f'below[{t}].indicator_var ∨ above[{t}].indicator_var'
+
+
 def test_a_complementarity_over_time_gets_every_new_time_by_its_rule():
     m = states()
     m.i = pyo.RangeSet(2)
@@ -115,9 +129,7 @@ def test_a_complementarity_over_time_gets_every_new_time_by_its_rule():
 def test_a_complementarity_that_skips_the_first_time_still_skips_it():
     m = states()
     m.F = pyo.Var(m.t, bounds=(0, None))
-    m.full = Complementarity(
-        m.t, rule=lambda m, t: Complementarity.Skip if t == 0 else complements(m.F[t] >= 0, 1 - m.x[t] >= 0)
-    )
+    m.full = Complementarity(m.t, rule=lambda m, t: Complementarity.Skip if t == 0 else complements(m.F[t] >= 0, 1 - m.x[t] >= 0))
     expand(m)
     assert set(m.full) == set(m.t) - {0}
 
@@ -305,10 +317,6 @@ def over_time(ctype, rule=None):
     return lambda m: setattr(m, 'bad', ctype(m.t, **({} if rule is None else {'rule': rule})))
 
 
-def logic(m):
-    m.bad = pyo.LogicalConstraint(m.t, rule=lambda m, t: m.below[t].indicator_var.implies(m.below[t].indicator_var))
-
-
 def hand_filled_disjunct(m):
     m.bad = Disjunct(m.t)
     for t in m.t:
@@ -319,6 +327,12 @@ def hand_filled_disjunction(m):
     m.bad = Disjunction(m.t)
     for t in m.t:
         m.bad[t] = [[m.x[t] >= 0], [m.x[t] <= 0]]
+
+
+def hand_filled_logic(m):
+    m.bad = pyo.LogicalConstraint(m.t)
+    for t in m.t:
+        m.bad[t] = m.below[t].indicator_var
 
 
 def hand_filled_complementarity(m):
@@ -333,10 +347,10 @@ REFUSED = {
         lambda m: setattr(m, 'bad', pyo.SOSConstraint(m.t, rule=lambda m, t: ([m.x[t]], [1]), sos=1)),
         'declare it after the discretisation',
     ),
-    'LogicalConstraint': (logic, 'regions of a Disjunction'),
     'BooleanVar': (over_time(pyo.BooleanVar), 'regions of a Disjunction'),
     'Set': (lambda m: setattr(m, 'bad', pyo.Set(m.t, initialize=[1])), 'a Set that does not depend on time'),
     'hand-filled Disjunct': (hand_filled_disjunct, 'declare it with a rule'),
+    'hand-filled LogicalConstraint': (hand_filled_logic, 'declare it with a rule'),
     'hand-filled Disjunction': (hand_filled_disjunction, 'declare it with a rule'),
     'hand-filled Complementarity': (hand_filled_complementarity, 'declare it with a rule'),
 }
@@ -364,7 +378,7 @@ def test_what_cannot_be_expanded_is_found_in_nested_blocks(kind):
     m.plant['a'].unit = signum.build()
     spoil(m.plant['a'].unit)
     with pytest.raises(FesdError, match=r'^plant\[a\].unit.bad: '):
-        discretise(m, m.plant['a'].unit.t, 3, 2, RADAU)
+        discretise(m, m.plant['a'].unit.t, [3], 2, RADAU)
 
 
 def test_a_hybrid_component_by_hand_that_holds_nothing_is_no_reason_to_refuse():
@@ -414,6 +428,12 @@ def failing_disjunction(m):
     m.bad = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= fails(t)], [m.x[t] >= 1]])
 
 
+def failing_logic(m):
+    m.bad = pyo.LogicalConstraint(
+        m.t, rule=lambda m, t: pyo.atleast(fails(t), m.below[t].indicator_var, m.above[t].indicator_var)
+    )
+
+
 def failing_complementarity(m):
     m.bad = Complementarity(m.t, rule=lambda m, t: complements(m.x[t] >= -9 * fails(t), m.x[t] <= 9))
 
@@ -447,6 +467,7 @@ FAILING = (
     failing_block,
     failing_disjunct,
     failing_disjunction,
+    failing_logic,
     failing_complementarity,
     failing_reference,
     missing_name,
@@ -482,15 +503,15 @@ def test_an_error_leaves_the_order_of_declaration_as_it_was():
 
 
 def test_an_error_after_the_expansion_leaves_the_model_as_it_was():
-    m = mixed(dcs(signum.build()))
+    m = unbounded(dcs(signum.build()))
     before = seen(m)
-    with pytest.raises(FesdError, match='two bounds on one side'):
+    with pytest.raises(FesdError, match='have 0 finite bounds'):
         move(m, 10)
     assert seen(m) == before
 
 
 def test_after_an_error_behind_the_expansion_the_modes_are_still_transformed_at_new_times():
-    m = mixed(dcs(signum.build()))
+    m = unbounded(dcs(signum.build()))
     with pytest.raises(FesdError):
         move(m, 10)
     forget(m, 'bad', 'z')
@@ -524,7 +545,7 @@ def test_an_error_in_an_integrand_of_a_sub_block_leaves_the_model_as_it_was():
 
 
 def test_an_integral_survives_an_error_after_the_expansion():
-    m = mixed(dcs(signum.build()))
+    m = unbounded(dcs(signum.build()))
     m.integral = dae.Integral(m.t, wrt=m.t, rule=lambda m, t: m.x[t] ** 2)
     m.cost = pyo.Objective(expr=m.integral)
     before, value = seen(m), pyo.value(m.cost)
@@ -537,10 +558,10 @@ def test_an_integral_survives_an_error_after_the_expansion():
     assert pyo.value(m.cost) == pytest.approx(8 / 9 + 64 / 81, abs=1e-8)
 
 
-def mixed(m):
-    """Adds a complementarity between two bounds, which is refused after the expansion."""
+def unbounded(m):
+    """Adds a complementarity of sides without bounds, which is refused after the expansion."""
     m.z = pyo.Var(m.t, initialize=0)
-    m.bad = Complementarity(m.t, rule=lambda m, t: complements(pyo.inequality(0, m.z[t], 1), m.x[t] - 5))
+    m.bad = Complementarity(m.t, rule=lambda m, t: complements(m.z[t], m.x[t] - 5))
     return m
 
 

@@ -173,3 +173,19 @@ def test_values_and_flags_of_the_variables_stay_as_they_were():
     move(m)
     after = {v.name: (v.value, v.fixed) for v in m.component_data_objects(pyo.Var)}
     assert before == {name: after[name] for name in before}
+
+
+def test_time_in_one_of_several_integrands_is_named_with_its_index(caplog):
+    m = signum.build()
+    m.moment = dae.Integral([0, 1, 2], m.t, wrt=m.t, rule=lambda m, k, t: t**k * m.x[t])
+    m.cost = pyo.Objective(expr=m.moment[0])
+    assert warned(m, caplog) == ['moment[1]', 'moment[2]']
+
+
+def test_values_that_change_from_stage_to_stage_are_not_warned_of(caplog):
+    m = signum.build()
+    m.t.add(1)
+    m.p = pyo.Param(m.t, mutable=True, initialize={1: 2.0, 2: 5.0})
+    m.y = pyo.Var(m.t, initialize=1)
+    m.extra = pyo.Constraint(m.t, rule=lambda m, t: m.y[t] == m.p[t] * m.x[t])
+    assert warned(m, caplog, piecewise_constant=[m.p]) == []

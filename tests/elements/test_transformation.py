@@ -8,6 +8,7 @@ import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 import signum
+from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
@@ -305,6 +306,47 @@ def test_of_two_continuous_sets_one_must_be_named():
 def test_time_must_be_a_continuous_set(name):
     m = signum.build()
     refused(m, f"{name}: .*'wrt' must be a pyomo.dae.ContinuousSet", wrt=m.component(name))
+
+
+# Switches where something ends
+
+
+@pytest.mark.parametrize('scheme', SCHEMES)
+@pytest.mark.parametrize('points', [(0, 2 / 3, 2), (0, 2 / 3, 1, 2), (0, 0.5, 2 / 3, 2)], ids=str)
+def test_a_switch_on_a_stage_boundary_is_told_once(points, scheme):
+    m = free_start.build(-2)
+    for point in points[1:-1]:
+        m.t.add(point)
+    run(m, nfe=6, ncp=2, scheme=scheme)
+    assert switch_time(m) == pytest.approx(2 / 3, abs=1e-9)
+    assert m.x[2].value == pytest.approx(4 / 3, abs=1e-9)
+
+
+@pytest.mark.parametrize('scheme', SCHEMES)
+def test_a_switch_on_a_stage_boundary_of_one_element_each_is_told_once(scheme):
+    m = free_start.build(-2)
+    m.t.add(2 / 3)
+    assert switch_time(run(m, nfe=2, ncp=2, scheme=scheme)) == pytest.approx(2 / 3, abs=1e-12)
+
+
+@pytest.mark.parametrize('scheme', SCHEMES)
+@pytest.mark.parametrize('bounds, x0, end', [((0, 2 / 3), -2, 0), ((0, 2), 0, 2)], ids=['at the end', 'at the start'])
+def test_a_switch_at_the_end_or_the_start_is_none(bounds, x0, end, scheme):
+    m = run(free_start.build(x0, bounds=bounds), nfe=6, ncp=2, scheme=scheme)
+    assert pyomo_fesd.switches(m) == []
+    assert m.x[bounds[1]].value == pytest.approx(end, abs=1e-9)
+
+
+@pytest.mark.parametrize('scheme', SCHEMES)
+@pytest.mark.parametrize('full', [0.7, 1.0], ids=['inside', 'on a stage boundary'])
+def test_a_hand_written_condition_switches_once_wherever_stages_end(full, scheme):
+    m = weir.build()
+    m.t.add(1.0)
+    m.V_max = pyo.Param(initialize=full)
+    m.del_component(m.overflow)
+    m.overflow = Complementarity(m.t, rule=lambda m, t: complements(m.V[t] <= m.V_max, m.F[t] >= 0))
+    solve(move(m, nfe=6, ncp=2, scheme=scheme))
+    assert switch_time(m) == pytest.approx(full, abs=1e-9)
 
 
 # Stages of a model that is discretised already

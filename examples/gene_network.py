@@ -1,0 +1,106 @@
+"""Two genes that regulate one another: modes in which one condition does not matter, and the two forms that write them.
+
+    dx1/dt = 40 s(x2 > 4) s(x1 < 8) - 4.5 x1        dx2/dt = 40 s(x1 > 4) s(x2 < 8) - 1.5 x2
+
+s is 1 where its condition holds and 0 elsewhere: a gene is expressed where the other protein is above its first threshold AND
+its own is below the second.  So each gene has three modes.  Where it is ``starved`` of the other protein, its own threshold does
+not matter: that mode has one condition only.
+
+From (10, 3) gene 1 is starved first and saturated next; in both modes protein 1 decays.  At 8 it begins to slide: gene 1 is
+expressed for 36/40 = 90 % of what it could be.  Protein 2 rises to 8 and slides there too, gene 2 expressed for 12/40 = 30 %.
+
+Source: Acary, de Jong, Brogliato, Numerical simulation of piecewise-linear models of gene regulatory networks using
+complementarity systems, Physica D 269 (2014).  Time and concentrations have no unit here.
+"""
+
+from math import log
+
+import pyomo.dae as dae
+import pyomo.environ as pyo
+
+import pyomo_fesd
+
+START, END = {1: 10.0, 2: 3.0}, 0.6
+DECAY, RATE = {1: 4.5, 2: 1.5}, 40.0
+NEEDED, ENOUGH = 4.0, 8.0
+OTHER = {1: 2, 2: 1}
+PICTURE = 'gene_network.png'
+
+
+def build():
+    """Both genes with three modes over time."""
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, END))
+    m.gene = pyo.Set(initialize=[1, 2])
+    m.x = pyo.Var(m.gene, m.t, initialize=lambda m, i, t: START[i])
+    m.dx = dae.DerivativeVar(m.x, wrt=m.t)
+    m.made = pyo.Var(m.gene, m.t, initialize=0)
+    for i in m.gene:
+        m.x[i, 0].fix(START[i])
+
+    @m.Constraint(m.gene, m.t)
+    def balance(m, i, t):
+        return m.dx[i, t] == m.made[i, t] - DECAY[i] * m.x[i, t]
+
+    @m.Disjunct(m.gene, m.t)
+    def starved(d, i, t):
+        d.region = pyo.Constraint(expr=m.x[OTHER[i], t] <= NEEDED)
+        d.rate = pyo.Constraint(expr=m.made[i, t] == 0)
+
+    @m.Disjunct(m.gene, m.t)
+    def expressed(d, i, t):
+        d.region = pyo.Constraint(expr=m.x[OTHER[i], t] >= NEEDED)
+        d.below = pyo.Constraint(expr=m.x[i, t] <= ENOUGH)
+        d.rate = pyo.Constraint(expr=m.made[i, t] == RATE)
+
+    @m.Disjunct(m.gene, m.t)
+    def saturated(d, i, t):
+        d.region = pyo.Constraint(expr=m.x[OTHER[i], t] >= NEEDED)
+        d.above = pyo.Constraint(expr=m.x[i, t] >= ENOUGH)
+        d.rate = pyo.Constraint(expr=m.made[i, t] == 0)
+
+    @m.Disjunction(m.gene, m.t)
+    def regulation(m, i, t):
+        return [m.starved[i, t], m.expressed[i, t], m.saturated[i, t]]
+
+    return m
+
+
+def exact_switches():
+    """Exact times: gene 1 is fed, protein 1 has decayed to its second threshold, protein 2 has risen to its own."""
+
+    def when(i, goal, rate):
+        """Time in which protein ``i`` goes from its start to ``goal`` while it is made at ``rate``."""
+        limit = rate / DECAY[i]
+        return log((limit - START[i]) / (limit - goal)) / DECAY[i]
+
+    return when(2, NEEDED, RATE), when(1, ENOUGH, 0), when(2, ENOUGH, RATE)
+
+
+def solve(form='auto', nfe=16, ncp=3):
+    """Transform and solve; returns the model and the solver's results."""
+    m = build()
+    pyo.TransformationFactory('fesd.dcs').apply_to(m, form=form)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=nfe, ncp=ncp)
+    return m, pyo.SolverFactory('mpec_hybrid').solve(m)
+
+
+def main():
+    """Solve in both forms, print switches and sizes, draw the proteins and the modes."""
+    for form in ('stewart', 'heaviside'):
+        m, results = solve(form)
+        size = pyomo_fesd.report(m)
+        numbers = ', '.join(f'{size[name]} {name}' for name in ('variables', 'constraints', 'pairs'))
+        print(f"{form}: {numbers}; {results.solver.nlp_iterations} iterations")
+    for switch, exact in zip(pyomo_fesd.switches(m), exact_switches()):
+        print(f"{switch}, {switch.time - exact:+.1e} off the exact time")
+    last = pyomo_fesd.trajectory(m).iloc[-1]
+    for i in m.gene:
+        share = last[f'regulation[{i}]: expressed[{i}]']
+        print(f"At the end gene {i} is expressed for {share:.6f} of what it could be.")
+    pyomo_fesd.plot(m, m.t, ['x', 'regulation[1]', 'regulation[2]']).savefig(PICTURE, dpi=150)
+    print(f'Picture: {PICTURE}')
+
+
+if __name__ == '__main__':
+    main()
