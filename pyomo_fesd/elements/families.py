@@ -16,6 +16,7 @@ from pyomo.mpec import Complementarity
 from pyomo_fesd import marks
 from pyomo_fesd.complementarity import Mixed, read
 from pyomo_fesd.elements.continuity import inner_label
+from pyomo_fesd.elements.equations import rule_of
 from pyomo_fesd.elements.mixed import source
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import discretised, strip_time
@@ -132,7 +133,7 @@ def read_families(conditions, continuity, times):
         if smooth == (True, False):
             sides, smooth = {t: (H, G) for t, (G, H) in sides.items()}, (False, True)
         jumps = tuple(s and continuity.jumps_at_stages(sides[inner][i]) for i, s in enumerate(smooth))
-        follows = inner is not None and not any(smooth) and all(map(_of_multipliers, sides[inner]))
+        follows = inner is not None and not any(smooth) and all(_of_multipliers(side, continuity) for side in sides[inner])
         families.append(Family(names[name], family, sides, smooth, jumps, follows))
         if inner is not None and not any(smooth) and not follows:
             unknown.add(_source_name(family[inner], times))
@@ -146,9 +147,9 @@ def read_families(conditions, continuity, times):
     return families
 
 
-def _of_multipliers(expr):
-    """Whether a side contains generated variables only."""
-    return all(map(marks.is_generated, identify_variables(expr)))
+def _of_multipliers(expr, continuity):
+    """Whether a side contains multipliers nu only: generated variables that nothing ties to the states."""
+    return all(marks.is_generated(v) and rule_of(v, continuity.rules) is None for v in identify_variables(expr))
 
 
 def _distinct_names(names):
