@@ -40,7 +40,7 @@ def call(node, args, place):
         return otherwise
     if condition.__class__ is InequalityExpression:
         q, level, sign = _surface(condition)
-        factor = place.multiple(difference, q, level)
+        factor = place.bends_by(then, otherwise, q, level)
         if factor is not None:
             # the branch for q < level, and what the other one adds to it
             return (otherwise if sign > 0 else then) + sign * factor * place.positive_part(q, level)

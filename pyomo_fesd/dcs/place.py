@@ -88,9 +88,9 @@ class Place:
         """Impose lower <= q <= upper."""
         self.shared.surfaces.keep_inside(self.time, q, lower, upper)
 
-    def multiple(self, expression, q, level):
-        """f where ``expression`` is f (q - level), None elsewhere."""
-        return self.shared.surfaces.multiple(expression, q, level)
+    def bends_by(self, then, otherwise, q, level):
+        """f where ``then - otherwise`` is f (q - level), None where it jumps."""
+        return self.shared.surfaces.bends_by(then, otherwise, q, level)
 
     def switch_off(self, component):
         """Deactivate a function whose value has been replaced."""

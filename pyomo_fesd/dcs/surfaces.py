@@ -22,13 +22,17 @@ from pyomo.core.expr.visitor import identify_mutable_parameters, identify_variab
 from pyomo_fesd import kink, marks
 from pyomo_fesd.dcs import step
 from pyomo_fesd.dcs.home import forget
-from pyomo_fesd.dcs.regions import PROPORTIONAL, value_now
+from pyomo_fesd.dcs.regions import value_now
 from pyomo_fesd.timeindex import discretised
 
 logger = logging.getLogger('pyomo_fesd')
 
 #: Random points at which two quantities are compared.
 POINTS = 5
+#: Relative agreement at which two quantities, or two levels, are the same.
+SAME = 1e-9
+#: Rounding error of a value, relative to the terms that it is made of.
+ROUNDING = 1e-13
 #: What a level may be.
 KINDS = ('kink', 'step')
 
@@ -74,13 +78,15 @@ class Surfaces:
             self._home.undo.callback(inside._data.pop, (time, *ends))
             inside.add((time, *ends), (ends[0], known, ends[1]))
 
-    def multiple(self, expression, q, level):
-        """The number f for which ``expression`` is f (q - level) everywhere; None if there is none."""
-        values, others = self._samples.of(expression), self._samples.of(q)
-        if values is None or others is None or _parameters(expression) or _parameters(q):
+    def bends_by(self, then, otherwise, q, level):
+        """The number f for which ``then - otherwise`` is f (q - level) everywhere; None if there is none, so that it jumps."""
+        values = [self._samples.of(e) for e in (then, otherwise, q)]
+        if any(v is None for v in values) or any(map(_parameters, (then, otherwise, q))):
             return None
-        relation = _affine(values, others - level)
-        return relation[0] if relation is not None and relation[1] == 0 else None
+        difference, c = values[0] - values[1], values[2] - level
+        f = float(difference @ c / (c @ c)) if c.any() else 0.0
+        rounding = ROUNDING * np.abs(values[:2]).max()
+        return _short(f) if np.abs(difference - f * c).max() <= SAME * np.abs(difference).max() + rounding else None
 
     def warn_explicit_time(self):
         """Levels that differ from point to point of an element depend on the time label, which is not physical time."""
@@ -189,8 +195,8 @@ def _affine(values, others):
     variation, other = values - values.mean(), others - others.mean()
     size = np.abs(other).max()
     f = float(variation @ (other / size) / (other / size @ other)) if size > 1e-100 else 0.0
-    rounding = 1e-14 * max(np.abs(values).max(), np.abs(f * others).max())
-    if not f or np.abs(variation - f * other).max() > PROPORTIONAL * np.abs(variation).max() + rounding:
+    rounding = ROUNDING * max(np.abs(values).max(), np.abs(f * others).max())
+    if not f or np.abs(variation - f * other).max() > SAME * np.abs(variation).max() + rounding:
         return None
     f = _short(f)
     d = float((values - f * others).mean())
@@ -200,13 +206,13 @@ def _affine(values, others):
 def _short(number):
     """A number without the rounding errors in its last digits."""
     short = float(f'{number:.12g}')
-    return short if abs(short - number) <= 1e-14 * abs(number) else number
+    return short if abs(short - number) <= ROUNDING * abs(number) else number
 
 
 def _as_known(block, level, scale):
     """A level as its quantity has it already, if it differs by rounding only."""
     known = (b for name in KINDS if block.component(name) is not None for b in block.component(name).levels)
-    return next((b for b in known if abs(b - level) <= PROPORTIONAL * scale), float(_short(level)))
+    return next((b for b in known if abs(b - level) <= SAME * scale), float(_short(level)))
 
 
 def _parameters(expression):

@@ -168,6 +168,16 @@ def test_along_a_line_the_function_is_collected_exactly(write, scheme):
     assert len(times) >= 2 and all(min(abs(b - t) for b in boundaries) < 1e-7 for t in times)
 
 
+@pytest.mark.parametrize(
+    'start, rates',
+    [((0.2, 1), (1.5, 0)), ((0, 0), (1.5, 1.5)), ((0.2, 0), (1.5, 0)), ((0.3, 2), (1.5, 0))],
+    ids=['side of a simplex', 'diagonal', 'lower side of the domain', 'upper side of the domain'],
+)
+def test_along_a_side_of_simplices_the_function_is_collected_exactly(start, rates):
+    m = run(line(PiecewiseLinearFunction(points=GRID, function=bowl), start, rates), 8, 2)
+    assert m.J[1].value == pytest.approx(collected(m.f, start, rates)[0], abs=1e-9)
+
+
 def test_a_discretised_model_gives_the_same():
     m = dcs(collocate(line(PiecewiseLinearFunction(points=GRID, function=bowl)), 8, 2))
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m)

@@ -33,7 +33,7 @@ from tests.problems.pieces import (
     in_blocks,
     states,
 )
-from tests.problems.running import run, solve, transform
+from tests.problems.running import SCHEMES, run, solve, transform
 
 WRITINGS = [by_piecewise, by_function, in_blocks, functions_in_blocks]
 writings = pytest.mark.parametrize('build', WRITINGS)
@@ -189,8 +189,9 @@ def test_the_solution_and_its_switches_are_exact_to_the_order_of_the_scheme(buil
 
 
 @writings
-def test_steps_of_constant_height_are_exact(build):
-    m = run(build(STAIRS, 0.5, 1.5), 8, 2)
+@pytest.mark.parametrize('scheme', SCHEMES)
+def test_steps_of_constant_height_are_exact(build, scheme):
+    m = run(build(STAIRS, 0.5, 1.5), 8, 2, scheme=scheme)
     x, met = exact(STAIRS, 0.5, 1.5)
     assert m.x[1.5].value == pytest.approx(x, abs=1e-9)
     assert [s.time for s in pyomo_fesd.switches(m)] == pytest.approx(met, abs=1e-9)
