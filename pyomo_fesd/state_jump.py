@@ -13,7 +13,7 @@ def state_jump(*sets, guard, reset):
 
     Parameters
     ----------
-    *sets
+    sets : Set, ...
         index sets, the ContinuousSet among them
     guard : function (block, *index) -> expression
         block is the parent, as in every Pyomo rule
