@@ -158,15 +158,15 @@ def _is_fixed(v):
 
 def _across(start, rules, held, inside, equations):
     """What is continuous without held controls, and without marks on what follows from them."""
-    held, kept = Known(_never, held), ComponentMap(rules.items())
+    held, late = Known(_never, held), {}
     while True:
-        across = _closure(Known(start.constant, start.given), kept, equations)
+        across = _closure(Known(start.constant, start.given), rules, equations, late)
         jumps = partial(_jumps, held, inside, across)
-        late = [v for v, rule in kept.items() if rule.ctype is Constraint and equations.mention(rule, jumps)]
-        if not late:
+        marked = [rule for rule in rules.values() if rule.ctype is Constraint]
+        found = {id(rule): equations.mentioning(rule, jumps) for rule in marked}
+        if found == late:
             return across
-        for v in late:
-            del kept[v]
+        late = found
 
 
 def _never(v):
@@ -178,9 +178,18 @@ def _jumps(held, inside, across, v):
     return v in held or (v in inside and v not in across)
 
 
-def _closure(known, rules, equations):
-    """``known`` and all that follows from it."""
-    known.given.update(v for v, rule in rules.items() if rule.ctype is Constraint)
+def _closure(known, rules, equations, late=None):
+    """``known`` and all that follows from it.
+
+    Parameters
+    ----------
+    late : dict, optional
+        by id of a Constraint, the indices at which it ties nothing
+    """
+    for v, rule in rules.items():
+        if rule.ctype is Constraint:
+            jumping = late.get(id(rule)) if late else None
+            known.given.update(equations.tied_by(v, rule, jumping) if jumping else [v])
     if equations is None:
         return known
     known.tied.update(equations.tied(known))

@@ -55,9 +55,13 @@ class Equations:
     def _data(self, component):
         return (d for d in component.values() if self._times.time(d) in self._labels)
 
-    def mention(self, rule, test):
-        """Whether a Constraint contains a variable for which ``test`` is true."""
-        return any(test(v) for c in self._data(rule) for v in variables_of(c.expr))
+    def mentioning(self, rule, test):
+        """The indices at which a Constraint contains a variable for which ``test`` is true."""
+        return {c.index() for c in self._data(rule) if any(test(v) for v in variables_of(c.expr))}
+
+    def tied_by(self, component, rule, apart):
+        """Data of a marked variable that have an equation of their own, not one of those with an index in ``apart``."""
+        return [v for v in self._data(component) if v.index() in rule and v.index() not in apart]
 
     def _function(self, component, rule):
         """A row for every value of a function at these times: its variable and those of the arguments."""
