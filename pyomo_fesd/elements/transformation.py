@@ -10,6 +10,7 @@ from pyomo_fesd.elements.continuity import check_told, inner_label, read_continu
 from pyomo_fesd.elements.controls import check_controls, fix_given, hold_controls
 from pyomo_fesd.elements.cross import FORMS, add_cross_complementarity, set_grid, sources
 from pyomo_fesd.elements.equilibration import MODES, add_equilibration
+from pyomo_fesd.elements.exits import add_exits
 from pyomo_fesd.elements.expansion import discretise
 from pyomo_fesd.elements.explicit_time import warn_explicit_time
 from pyomo_fesd.elements.families import (
@@ -203,6 +204,8 @@ class FiniteElements(Transformation):
             add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
             if families or modes or jumps:
                 add_equilibration(block, families, modes, grid, config.equilibration, config.rho)
+                if config.equilibration == 'two_stage':
+                    add_exits(block, families, grid)
                 add_moves(block, families, modes, jumps, grid)
             else:
                 block.r.fix(1)

@@ -114,6 +114,7 @@ def _numbers(problem, nl, layout, sides, scale, source, conditions, variables):
         sign=-1.0 if problem.objective is not None and problem.objective.sense == maximize else 1.0,
         has_objective=problem.objective is not None,
         scale=scale,
+        tentative=np.array([d.tentative for d in problem.decisions], dtype=bool),
         moves=_moves(problem, conditions, variables, scale.x),
         **source.read(),
     )

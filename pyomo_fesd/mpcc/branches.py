@@ -221,4 +221,8 @@ class Branches:
         if first is None or not c.eta.numel():
             return first, None
         equal = c.evaluate(first.w).eta > self._tolerances.eta
-        return self._steps.branch(first.w, zero, equal, 0.0, duals=first, **more), equal
+        second = self._steps.branch(first.w, zero, equal, 0.0, duals=first, **more)
+        if second is None and c.tentative is not None and np.any(equal & c.tentative):
+            equal = equal & ~c.tentative
+            second = self._steps.branch(first.w, zero, equal, 0.0, duals=first, **more)
+        return second, equal

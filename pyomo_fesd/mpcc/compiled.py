@@ -44,6 +44,7 @@ class Numbers:
     has_objective : bool
     scale : Scale
     moves : list of Move
+    tentative : bool array, decisions that are dropped where they leave no solution
     """
 
     lbx: np.ndarray
@@ -60,6 +61,7 @@ class Numbers:
     has_objective: bool
     scale: object
     moves: list = field(default_factory=list)
+    tentative: np.ndarray = None
 
 
 @dataclass(frozen=True)

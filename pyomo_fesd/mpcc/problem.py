@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from pyomo.common.collections import ComponentMap
+from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, LogicalConstraint, Objective, SOSConstraint, Var
 from pyomo.dae import DerivativeVar, Integral
 from pyomo.gdp import Disjunct, Disjunction
@@ -52,11 +52,14 @@ class Decision:
         where it is positive, ``constraint`` holds
     constraint : ConstraintData
         an inactive equality
+    tentative : bool
+        whether it is dropped where it leaves no solution
     """
 
     source: object
     eta: object
     constraint: object
+    tentative: bool = False
 
 
 @dataclass
@@ -101,13 +104,14 @@ def read_problem(model):
     _refuse(model)
     problem = Mpcc(model, objective=_objective(model))
     decided = {id(pair): constraint for pair, constraint in marks.marked(model, marks.DECIDED)}
+    tentative = ComponentSet(pair for pair, _ in marks.marked(model, marks.TENTATIVE))
     for source in model.component_data_objects(Complementarity, active=True, descend_into=Block):
         problem.sources.append(source)
         condition = read(source)
         if isinstance(condition, Mixed):
             problem.mixed.append((source, condition))
         elif id(source) in decided:
-            problem.decisions.append(Decision(source, condition.H, decided[id(source)]))
+            problem.decisions.append(Decision(source, condition.H, decided[id(source)], source in tentative))
         else:
             problem.conditions.append(Condition(source, *condition))
     problem.penalties = list(marks.marked(model, marks.PENALTY))
