@@ -11,6 +11,8 @@ Leaves: ``move`` (a Block for each move) with the mark MOVE, by which ``mpec_hyb
 Does not apply: to a single element.
 """
 
+from collections import defaultdict
+
 from pyomo.core import Block
 
 from pyomo_fesd import marks
@@ -19,6 +21,7 @@ from pyomo_fesd import marks
 def add_moves(block, families, modes, jumps, grid):
     """Add the two moves of every inner boundary."""
     block.move = Block(range(1, len(grid.elements)), [-1, 1])
+    places = {names: _by_number(block, names) for names in (*ELEMENTS, *BOUNDARIES)}
     opens = {e.n for e in grid.elements if e.opens_stage}
     for b in range(1, len(grid.elements)):
         for step in (-1, 1):
@@ -29,7 +32,7 @@ def add_moves(block, families, modes, jumps, grid):
                 marks.mark(home, marks.MOVE, block.r[changed])
             else:
                 _start_short(home, block, grid, changed)
-            for target, source in _pairs(block, changed, b, step):
+            for target, source in _pairs(places, changed, b, step):
                 marks.mark(home, marks.MOVE, target, source)
 
 
@@ -48,20 +51,24 @@ ELEMENTS = ((None, 'cross'), ('memory', 'binary'))
 BOUNDARIES = (('memory', 'parts'), ('memory', 'region'), ('memory', 'leaving'), ('jumps', 'happens'), ('jumps', 'binary'))
 
 
-def _pairs(block, changed, boundary, step):
-    """``(pair, pair whose zero side it takes over)`` of one move."""
-    for names in ELEMENTS:
-        yield from _like(block, names, changed, changed - step)
-    for names in BOUNDARIES:
-        yield from _like(block, names, boundary + step, boundary)
-        yield from _like(block, names, boundary, boundary - step)
-
-
-def _like(block, names, number, other):
-    """Pairs whose second index is ``number``, beside those that have ``other`` there."""
-    home = block.component(names[0]) if names[0] else block
+def _by_number(block, names):
+    """The pairs of a component by their second index, then by the rest of it."""
+    home, found = block.component(names[0]) if names[0] else block, defaultdict(dict)
     pairs = home.component(names[1]) if home is not None else None
     for index, pair in pairs.items() if pairs is not None else ():
-        beside = (index[0], other, *index[2:])
-        if index[1] == number and beside in pairs:
-            yield pair, pairs[beside]
+        found[index[1]][(index[0], *index[2:])] = pair
+    return found
+
+
+def _pairs(places, changed, boundary, step):
+    """``(pair, pair whose zero side it takes over)`` of one move."""
+    for names in ELEMENTS:
+        yield from _like(places[names], changed, changed - step)
+    for names in BOUNDARIES:
+        yield from _like(places[names], boundary + step, boundary)
+        yield from _like(places[names], boundary, boundary - step)
+
+
+def _like(pairs, number, other):
+    """Pairs of one number, beside those of another that agree with them in everything else."""
+    return ((pair, pairs[other][rest]) for rest, pair in pairs[number].items() if rest in pairs[other])
