@@ -21,6 +21,8 @@ from pyomo.core import Expression, Set, Var
 from pyomo_fesd import marks
 from pyomo_fesd.dcs.modes import ModeEquations
 from pyomo_fesd.dcs.regions import conditions
+from pyomo_fesd.dcs.system import refuse_defined_in_regions
+from pyomo_fesd.errors import FesdError
 
 NAME = 'memory'
 
@@ -56,7 +58,10 @@ def read(reader, disjunction):
     if len(modes) == 1:
         return reader.read(disjunction)
     equations, inequalities = reader.contents(disjunction, modes)
-    return MemorySystem(disjunction, modes, [[c for con in cons for c in conditions(con)] for cons in inequalities], equations)
+    regions = [[c for con in constraints for c in conditions(con)] for constraints in inequalities]
+    refuse_defined_in_regions(disjunction, [c for region in regions for c in region], equations)
+    _refuse_ambiguous(disjunction, modes)
+    return MemorySystem(disjunction, modes, regions, equations)
 
 
 def applies(system):
@@ -97,16 +102,29 @@ def add(block, index, system):
     return weights
 
 
+def _possible(modes):
+    """The modes that fixed indicators leave open: the one that is fixed to True, or all that are not fixed to False."""
+    fixed = [d.indicator_var.value if d.indicator_var.fixed else None for d in modes]
+    return [d for d, value in zip(modes, fixed) if value] or [d for d, value in zip(modes, fixed) if value is None]
+
+
+def _refuse_ambiguous(disjunction, modes):
+    possible = _possible(modes)
+    if len(possible) not in (1, len(modes)):
+        off = next(d for d in modes if d.indicator_var.fixed)
+        raise FesdError(
+            disjunction,
+            f"the indicator of '{off.name}' is fixed to False, which leaves {len(possible)} other modes",
+            "fix the one that comes first to True; deactivate a disjunct that is never active",
+        )
+
+
 def _take_given(modes, nu):
-    """An indicator that the user fixed, as that of the mode at the first time, fixes its multiplier."""
-    on = [d.indicator_var.fixed and d.indicator_var.value for d in modes]
-    for variable, disjunct, one in zip(nu, modes, on):
-        if any(on):
-            variable.fix(float(one))
-        elif disjunct.indicator_var.fixed:
-            variable.fix(0.0)
-    if len(nu) == 1 and modes[1].indicator_var.fixed and not modes[1].indicator_var.value:
-        nu[0].fix(1.0)
+    """An indicator that the user fixed, as that of the mode at the first time, fixes the multipliers."""
+    possible = _possible(modes)
+    for variable, disjunct in zip(nu, modes):
+        if len(possible) == 1:
+            variable.fix(float(disjunct is possible[0]))
 
 
 def equations(block, index):

@@ -78,7 +78,7 @@ class Reader:
         equations, inequalities = self.contents(disjunction, modes)
         patterns = self._patterns.setdefault(self._times.split(disjunction)[1], {})
         regions = read_regions(disjunction, modes, inequalities, patterns)
-        _refuse_defined_in_regions(disjunction, regions.functions, equations)
+        refuse_defined_in_regions(disjunction, regions.functions, equations)
         return System(disjunction, modes, regions, equations)
 
     def modes(self, disjunction, fixed_are_left_out=True):
@@ -153,7 +153,8 @@ class Reader:
                         )
 
 
-def _refuse_defined_in_regions(disjunction, functions, equations):
+def refuse_defined_in_regions(disjunction, functions, equations):
+    """A region condition must not contain what the modes define: it would jump at the switch."""
     defined = ComponentSet(equations.defined)
     for c in functions:
         for v in identify_variables(c, include_fixed=True):

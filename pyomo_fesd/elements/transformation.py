@@ -19,13 +19,13 @@ from pyomo_fesd.elements.equilibration import MODES, add_equilibration
 from pyomo_fesd.elements.expansion import discretise
 from pyomo_fesd.elements.explicit_time import warn_explicit_time
 from pyomo_fesd.elements.grid import check_resolution, read_grid
-from pyomo_fesd.elements.jumps import add_jumps, read_jumps
+from pyomo_fesd.elements.jumps import add_jumps, check_guards, read_jumps
 from pyomo_fesd.elements.lengths import add_lengths, check_orders, multiply_derivatives
 from pyomo_fesd.elements.memory import add_memory, read_modes
 from pyomo_fesd.elements.moves import add_moves
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
 from pyomo_fesd.elements.restore import restored_on_error
-from pyomo_fesd.elements.right_limits import start_after_jumps
+from pyomo_fesd.elements.right_limits import RightLimits
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set
 
@@ -141,6 +141,7 @@ class FiniteElements(Transformation):
             check_orders(instance.model(), wrt)
             families = read_families(instance, wrt, config.piecewise_constant, config.continuous)
             modes, jumps = read_modes(instance.model(), wrt), read_jumps(instance.model(), wrt)
+            check_guards(jumps, config.piecewise_constant)
             waiting = next(_active_disjunctions(instance, wrt), None)
             if waiting is not None and not (families or modes or jumps):
                 raise FesdError(
@@ -159,8 +160,9 @@ class FiniteElements(Transformation):
             hold_controls(block, config.piecewise_constant, grid, wrt)
             multiply_derivatives(instance.model(), wrt, block, grid)
             add_jumps(block, jumps, grid, wrt)
-            families = start_after_jumps(block, families, jumps, grid, wrt, config.piecewise_constant, config.continuous)
-            add_memory(block, modes, grid, wrt)
+            limits = RightLimits(block, jumps, grid, wrt, config.piecewise_constant, config.continuous)
+            families = list(map(limits.family, families))
+            add_memory(block, modes, limits, grid, wrt)
             add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
             if families or modes or jumps:
                 add_equilibration(block, families, modes, grid, config.equilibration, config.rho)

@@ -87,4 +87,3 @@ class Window:
         for k, v in enumerate(equations.unknown):
             if k or not self._steps:
                 v.set_value(self.model.unknown[k].value, skip_validation=True)
-
