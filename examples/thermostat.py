@@ -30,13 +30,18 @@ def switching_times(horizon=HORIZON):
     return list(takewhile(lambda t: t < horizon, accumulate(stretches, initial=FIRST)))
 
 
-def build(horizon=HORIZON):
-    """Two modes with overlapping regions, heating first."""
+def room(horizon=HORIZON):
+    """A temperature over time."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, horizon))
     m.y = pyo.Var(m.t, initialize=START)
     m.dy = dae.DerivativeVar(m.y)
     m.y[0].fix(START)
+    return m
+
+
+def add_heater(m):
+    """Two modes with overlapping regions, heating first."""
 
     @m.Disjunct(m.t)
     def heating(d, t):
@@ -56,6 +61,11 @@ def build(horizon=HORIZON):
 
     m.heating[0].indicator_var.fix(True)
     return m
+
+
+def build(horizon=HORIZON):
+    """The room with its heater."""
+    return add_heater(room(horizon))
 
 
 def transform(m, nfe=15, ncp=3, scheme='LAGRANGE-RADAU'):

@@ -63,7 +63,9 @@ def mark(block, name, component, value=True):
 def suffixes(block, name, used=False):
     """The Suffixes that hold mark ``name`` on ``block`` and the active blocks below it; with ``used`` also those used up."""
     active = None if used else True
-    return (s for s in block.component_objects(Suffix, active=active, descend_into=Block) if s.local_name == name)
+    found = (s for s in block.component_objects(Suffix, active=active, descend_into=Block) if s.local_name == name)
+    # data that pyomo.dae adds to a Block that is switched off as a whole are active
+    return (s for s in found if s.parent_block().parent_component().active)
 
 
 def marked(block, name, used=False):

@@ -21,6 +21,8 @@ from pyomo_fesd import marks
 from pyomo_fesd.dcs.modes import ModeEquations
 from pyomo_fesd.dcs.nested import Tree
 from pyomo_fesd.dcs.regions import conditions
+from pyomo_fesd.dcs.system import refuse_defined_in_regions
+from pyomo_fesd.errors import FesdError
 
 NAME = 'memory'
 
@@ -59,7 +61,10 @@ def read(reader, tree, modes):
         for what every Disjunction is refused for, but not for overlaps, gaps, or modes without a region
     """
     equations, inequalities = reader.contents(tree, modes)
-    return MemorySystem(tree, modes, [[c for con in cons for c in conditions(con)] for cons in inequalities], equations)
+    regions = [[c for con in constraints for c in conditions(con)] for constraints in inequalities]
+    refuse_defined_in_regions(tree.disjunction, [c for region in regions for c in region], equations)
+    _refuse_ambiguous(tree.disjunction, modes)
+    return MemorySystem(tree, modes, regions, equations)
 
 
 def applies(system):
@@ -97,17 +102,36 @@ def add(block, index, system):
     _take_given(system.modes, nu)
 
 
-def _take_given(modes, nu):
-    """An indicator that the user fixed, as that of the mode at the first time, fixes its multiplier."""
+def _possible(modes):
+    """The modes that fixed indicators leave open: the one whose disjuncts are fixed to True, or all with none fixed to False."""
     given = [{d.indicator_var.value for d in mode.disjuncts if d.indicator_var.fixed} for mode in modes]
-    on = [values == {True} for values in given]
-    for variable, one, values in zip(nu, on, given):
-        if any(on):
-            variable.fix(float(one))
-        elif False in values:
-            variable.fix(0.0)
-    if len(nu) == 1 and not any(on) and False in given[1]:
-        nu[0].fix(1.0)
+    return [m for m, values in zip(modes, given) if values == {True}] or [m for m, v in zip(modes, given) if False not in v]
+
+
+def _refuse_ambiguous(disjunction, modes):
+    possible = _possible(modes)
+    on = [m for m in possible if any(d.indicator_var.fixed for d in m.disjuncts)]
+    if len(on) > 1:
+        raise FesdError(
+            disjunction,
+            "two modes are fixed to True: " + ', '.join(f"'{m.name}'" for m in on),
+            "a switching system is in one mode at a time: fix one indicator only",
+        )
+    if len(possible) not in (1, len(modes)):
+        off = next(d for mode in modes for d in mode.disjuncts if d.indicator_var.fixed)
+        raise FesdError(
+            disjunction,
+            f"the indicator of '{off.name}' is fixed to False, which leaves {len(possible)} other modes",
+            "fix the one that comes first to True; deactivate a disjunct that is never active",
+        )
+
+
+def _take_given(modes, nu):
+    """An indicator that the user fixed, as that of the mode at the first time, fixes the multipliers."""
+    possible = _possible(modes)
+    for variable, mode in zip(nu, modes):
+        if len(possible) == 1:
+            variable.fix(float(mode is possible[0]))
 
 
 def weight(block, index, system, modes):

@@ -83,7 +83,7 @@ class Reader:
         equations, inequalities = self.contents(tree, modes)
         patterns = self._patterns.setdefault(self._times.split(tree.disjunction)[1], {})
         regions = read_regions(tree.disjunction, modes, inequalities, patterns)
-        _refuse_defined_in_regions(tree.disjunction, regions.functions, equations)
+        refuse_defined_in_regions(tree.disjunction, regions.functions, equations)
         return System(tree, modes, regions, equations)
 
     def contents(self, tree, modes):
@@ -135,7 +135,8 @@ class Reader:
                         )
 
 
-def _refuse_defined_in_regions(disjunction, functions, equations):
+def refuse_defined_in_regions(disjunction, functions, equations):
+    """A region condition must not contain what the modes define: it would jump at the switch."""
     defined = ComponentSet(equations.defined)
     for c in functions:
         for v in identify_variables(c, include_fixed=True):

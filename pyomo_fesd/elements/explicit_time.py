@@ -27,7 +27,7 @@ def warn_explicit_time(block, wrt, grid, integrands):
     stage = {t: e.stage for e in grid.elements for t in e.points}
     for name, family in _families(block, wrt, grid, integrands).items():
         points = _spread([t for t in family if t in stage])
-        if any(_differ([family[t] for t in points if stage[t] == s]) for s in {stage[t] for t in points}):
+        if any(differ([family[t] for t in points if stage[t] == s]) for s in {stage[t] for t in points}):
             logger.warning(
                 "%s: its numbers depend on the time label (a Param over time, or t itself in a rule). Labels are not physical "
                 "time once elements move. Take time from a clock state, pyomo_fesd.clock(m, m.%s)[t], or name inputs that are "
@@ -73,7 +73,7 @@ def _spread(points, most=12):
     return points[:: max(1, len(points) // most)]
 
 
-def _differ(expressions):
+def differ(expressions):
     """Whether the expressions differ where all variables have the same values."""
     numbers = [n for n in map(_at_fixed_values, expressions) if n is not None]
     return bool(numbers) and max(numbers) - min(numbers) > 1e-9 * max(1.0, *map(abs, numbers))

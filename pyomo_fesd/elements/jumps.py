@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint, ConstraintList, Expression, Set, Var, quicksum
-from pyomo.core.expr.visitor import replace_expressions
+from pyomo.core.expr.visitor import identify_variables, replace_expressions
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
@@ -71,6 +71,19 @@ def read_jumps(model, wrt):
     return list(found.values())
 
 
+def check_guards(jumps, controls):
+    """Refuse guards that contain a held control: they would jump at the boundary of a stage, where no state does."""
+    for jump in jumps:
+        for guard in jump.guards.values():
+            control = next((v for v in identify_variables(guard) if any(v.parent_component() is u for u in controls)), None)
+            if control is not None:
+                raise FesdError(
+                    jump.name,
+                    f"its guard contains the control '{control.name}', which is held on each stage and jumps between them",
+                    "let the guard depend on states only",
+                )
+
+
 def add_jumps(block, jumps, grid, wrt):
     """Put the jumps at the inner boundaries of ``grid`` on ``block``, and let elements start after them."""
     if not jumps:
@@ -99,7 +112,7 @@ def _start_after(home, jumps, grid, wrt):
     """Elements start from the values after the boundary on their left."""
     times, owner, starts = TimeIndex(wrt), grid.element_of(), {}
     home.number = Set(dimen=1)
-    home.after = Expression(home.boundary, home.number)
+    home.after = Expression(home.boundary, home.number, rule=lambda *_: Expression.Skip)
     for element in grid.elements[:-1]:
         states = jumping_states(jumps, element.right)
         for j, (x, laws) in enumerate(states.items(), start=1):

@@ -1,30 +1,34 @@
-"""Hysteresis between elements: a mode goes on over element boundaries until a condition of its region ends.
+"""Hysteresis between elements: a mode goes on over element boundaries until a condition of its region ends (eq. E1).
 
-With the weight nu_{n,i} of mode i in element n, constant in the element, and c_ik = p - n at the boundaries b = 0..N:
+With the weight nu_{n,i} of mode i in element n, constant in the element, and its conditions c_ik at the boundaries b = 0..N:
 
     binary:     0 <= nu_{n,i}  perp  1 - nu_{n,i} >= 0
-    parts:      0 <= n_{b,ik}  perp  p_{b,ik} >= 0
+    parts:      0 <= n_{b,ik}  perp  n_{b,ik} + c_ik(x_b) >= 0         (n is the negative part)
     region:     0 <= n_{b,ik}  perp  nu_{b,i} + nu_{b+1,i} >= 0       (the elements on either side)
-    leaving:    0 <= d_{b,ik}  perp  p_{b,ik} >= 0,                   nu_{b,i} - nu_{b+1,i} <= sum_k d_{b,ik}
+    leaving:    0 <= d_{b,ik}  perp  n_{b,ik} + c_ik(x_b) >= 0,       nu_{b,i} - nu_{b+1,i} <= sum_k d_{b,ik}
 
 so a mode is left (d > 0) only where one of its c_ik is 0, and it cannot go on beyond.  There is no multiplier between 0 and 1:
-modes with memory do not slide.
+modes with memory do not slide.  Where a condition jumps at the boundary, with a state or with a set-point that differs from stage
+to stage, it stands there twice: the left one for the element before, the right one for the element after and for leaving.
 
 Takes: the marks MEMORY.
-Leaves: ``memory`` (a block): ``p``, ``n``, ``d``, ``switching``, ``leave``, ``hold``, and the pairs ``binary``, ``parts``,
-``region`` and ``leaving``.
+Leaves: ``memory`` (a block): ``n``, ``d``, ``leave``, ``one``, ``beyond`` (conditions right of a boundary), and the pairs
+``binary``, ``parts``, ``region`` and ``leaving``; the weights of an element have one variable.
 Does not apply: to a condition that ends and begins again inside one element; more elements find it.
 """
 
 import re
 from dataclasses import dataclass
 
-from pyomo.core import Block, Constraint, Set, Var, quicksum, value
+from pyomo.core import Block, Constraint, Expression, Set, Var, quicksum, value
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
 from pyomo_fesd.timeindex import TimeIndex
+
+#: Sides of a boundary: a condition that jumps there stands on both, any other on the left only.
+LEFT, RIGHT = 0, 1
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ def read_modes(model, wrt):
     ]
 
 
-def add_memory(block, modes, grid, wrt):
+def add_memory(block, modes, limits, grid, wrt):
     """Put the law of switching between the elements of ``grid`` on ``block``; the marks are used up."""
     if not modes:
         return
@@ -88,7 +92,9 @@ def add_memory(block, modes, grid, wrt):
     memory.mode = Set(initialize=[m.name for m in modes], ordered=True)
     memory.boundary = Set(initialize=range(len(grid.elements) + 1), ordered=True)
     memory.number = Set(initialize=range(1, most + 1), ordered=True)
-    index = (memory.mode, memory.boundary, memory.number)
+    memory.side = Set(initialize=[LEFT, RIGHT], ordered=True)
+    memory.beyond = Expression(memory.mode, memory.boundary, memory.number, rule=lambda *_: Expression.Skip)
+    index = (memory.mode, memory.boundary, memory.number, memory.side)
     memory.n = Var(*index, dense=False, bounds=(0, None))
     memory.d = Var(*index, dense=False, bounds=(0, 1))
     memory.leave = Constraint(memory.mode, memory.boundary)
@@ -100,7 +106,7 @@ def add_memory(block, modes, grid, wrt):
         _hold(mode, grid, wrt)
     for mode in modes:
         _add_elements(memory, mode, grid)
-        _add_boundaries(memory, mode, grid, wrt)
+        _add_boundaries(memory, mode, limits, grid, wrt)
 
 
 def _hold(mode, grid, wrt):
@@ -127,22 +133,34 @@ def _add_elements(memory, mode, grid):
             memory.one.add((mode.name, element.n), nu >= 0)
 
 
-def _add_boundaries(memory, mode, grid, wrt):
+def _add_boundaries(memory, mode, limits, grid, wrt):
     labels = [wrt.first(), *(e.right for e in grid.elements)]
-    weights = [None, *(mode.weight(e).expr for e in grid.elements), None]
-    for b, label in enumerate(labels):
-        before, after = weights[b], weights[b + 1]
-        sides = [w for w in (before, after) if w is not None]
-        inner, left = len(sides) == 2, []
+    elements = [None, *grid.elements, None]
+    for b, (label, before, after) in enumerate(zip(labels, elements, elements[1:])):
+        inner, ends = before is not None and after is not None, []
         for k, c in enumerate(mode.conditions[label], start=1):
-            n = memory.n[mode.name, b, k]
-            n.value = max(-(value(c, exception=False) or 0.0), 0.0)
-            memory.parts.add((mode.name, b, k), complements(n >= 0, n + c >= 0))
-            memory.region.add((mode.name, b, k), complements(n >= 0, quicksum(sides) >= 0))
-            if inner:
-                d = memory.d[mode.name, b, k]
-                d.value = 0.0
-                left.append(d)
-                memory.leaving.add((mode.name, b, k), complements(d >= 0, n + c >= 0))
+            functions = {t: conditions[k - 1] for t, conditions in mode.conditions.items()}
+            beyond = limits.condition(before, after, functions) if inner else None
+            if beyond is None:
+                ends += _add_condition(memory, (mode.name, b, k, LEFT), c, mode, (before, after), inner)
+            else:
+                memory.beyond[mode.name, b, k] = beyond
+                _add_condition(memory, (mode.name, b, k, LEFT), c, mode, (before,), False)
+                ends += _add_condition(memory, (mode.name, b, k, RIGHT), beyond, mode, (after,), True)
         if inner:
-            memory.leave.add((mode.name, b), before - after <= quicksum(left))
+            memory.leave.add((mode.name, b), mode.weight(before).expr - mode.weight(after).expr <= quicksum(ends))
+
+
+def _add_condition(memory, index, c, mode, elements, may_end):
+    """One condition at one boundary, for the elements beside it; returns d as a list if the mode may end there."""
+    n = memory.n[index]
+    n.value = max(-(value(c, exception=False) or 0.0), 0.0)
+    weights = [mode.weight(e).expr for e in elements if e is not None]
+    memory.parts.add(index, complements(n >= 0, n + c >= 0))
+    memory.region.add(index, complements(n >= 0, quicksum(weights) >= 0))
+    if not may_end:
+        return []
+    d = memory.d[index]
+    d.value = 0.0
+    memory.leaving.add(index, complements(d >= 0, n + c >= 0))
+    return [d]

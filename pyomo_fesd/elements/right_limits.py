@@ -1,4 +1,4 @@
-"""Right limits: where states jump, what depends on them jumps with them (events page, eq. E4).
+"""Right limits: what depends on states that jump, or on controls and data that differ from stage to stage (events page, eq. E4).
 
 A side that is continuous but for the jumps of states enters an element with its value *after* the boundary on the left:
 
@@ -8,54 +8,56 @@ States are replaced by their values after the jump.  Algebraic variables that eq
 switching function, a level that follows from a volume) get a copy at the boundary, with copies of these equations; so does the
 part s of a kink, whose pair defines it.  Where no jump happens the copies repeat the values on the left.
 
-Takes: families of ``cross`` and the jumps.
+Takes: the jumps; families of ``cross`` and conditions of modes with memory.
 Leaves: the families with ``starts``; ``copy`` (Vars) and ``copied`` (Constraints) on the block of the jumps.
 Does not apply: to variables of which the user only says that they are continuous.
 """
 
 from collections import Counter, defaultdict
 from dataclasses import replace
+from functools import cached_property
 
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint, Set, Var
 from pyomo.core.expr.visitor import identify_variables, replace_expressions
 from pyomo.mpec import Complementarity
 
+from pyomo_fesd.elements.explicit_time import differ
 from pyomo_fesd.elements.jumps import values_after
 from pyomo_fesd.timeindex import DISCRETISATION, derivatives
 
 
-def start_after_jumps(block, families, jumps, grid, times, continuity, config):
-    """The families, with the sides that their elements start from where a state jumps.
+class RightLimits:
+    """What stands for variables right of the inner boundaries, made when it is asked for.
 
     Parameters
     ----------
+    block : Block
+        of the moving grid, with its ``jumps`` if there are any
+    jumps : list of Jump
     continuity : Continuity
-    config : ConfigDict
-        with ``piecewise_constant`` and ``continuous``: held on each stage, and said by the user to be continuous
+    given : list of Var
+        held on each stage, or said by the user to be continuous
     """
-    if not jumps:
-        return families
-    given = [*config.piecewise_constant, *config.continuous]
-    limits = _RightLimits(block, jumps, grid, _Ties(block.model(), times, grid, continuity, given))
-    return [replace(f, starts=limits.starts(f)) if any(f.continuous) else f for f in families]
 
+    def __init__(self, block, jumps, grid, times, continuity, given):
+        self._model, self._grid, self._times = block.model(), grid, times
+        self._home, self._continuous = block.component('jumps'), _Continuous(block.model(), times, continuity, given)
+        self._states = {e.n: values_after(self._home, jumps, e) for e in grid.elements[:-1]} if jumps else {}
+        self._copies, self._done = {n: ComponentMap() for n in self._states}, ComponentSet()
+        if jumps:
+            self._home.place = Set(dimen=1)
+            self._home.copy = Var(self._home.boundary, self._home.place, dense=False)
+            self._home.copied = Constraint(self._home.boundary, self._home.place)
 
-class _RightLimits:
-    """What stands for variables right of each inner boundary, made when it is asked for."""
+    @cached_property
+    def _ties(self):
+        return _Ties(self._model, self._times, self._grid, self._continuous)
 
-    def __init__(self, block, jumps, grid, ties):
-        self._home, self._grid = block.jumps, grid
-        self._states = {e.n: values_after(block.jumps, jumps, e) for e in grid.elements[:-1]}
-        self._copies = {e.n: ComponentMap() for e in grid.elements[:-1]}
-        self._done = ComponentSet()
-        self._ties = ties
-        self._home.place = Set(dimen=1)
-        self._home.copy = Var(self._home.boundary, self._home.place, dense=False)
-        self._home.copied = Constraint(self._home.boundary, self._home.place)
-
-    def starts(self, family):
-        """Element number -> the pair of sides after the boundary on its left; elements where nothing differs are left out."""
+    def family(self, family):
+        """A family with the pairs that elements start from where the sides on their left may differ."""
+        if not self._states or not any(family.continuous):
+            return family
         found = {}
         for before, element in zip(self._grid.elements, self._grid.elements[1:]):
             pair = family.sides.get(before.right)
@@ -63,10 +65,32 @@ class _RightLimits:
                 swap = self._swap(before, [v for side in pair for v in _variables(side)])
                 if swap:
                     found[element.n] = type(pair)(*(replace_expressions(side, swap) for side in pair))
-        return found
+        return replace(family, starts=found)
+
+    def condition(self, before, element, functions):
+        """A function of time right of the boundary between two elements; None where it does not differ from that on the left.
+
+        Parameters
+        ----------
+        functions : dict label -> expression
+        """
+        there = functions[before.right]
+        after = self._of_next_stage(before, functions[element.points[0]]) if element.opens_stage else there
+        # the same but for controls of the next stage, and for numbers that differ from stage to stage
+        same = not element.opens_stage or (
+            all(self._continuous.across(v) for v in _variables(there)) and not differ([lambda: there, lambda: after])
+        )
+        after = there if same else after
+        swap = self._swap(before, _variables(after)) if self._states else {}
+        return None if same and not swap else replace_expressions(after, swap)
+
+    def _of_next_stage(self, before, expr):
+        """An expression of the next element at its left boundary: controls keep their new values."""
+        moved = [v for v in _variables(expr) if self._times.time(v) is not None and self._continuous.across(v)]
+        return replace_expressions(expr, {id(v): self._times.at(v, before.right) for v in moved})
 
     def _swap(self, before, variables):
-        """id of those variables that differ after the boundary -> what stands for them."""
+        """id of those variables that differ after a jump -> what stands for them."""
         states, copies = self._states[before.n], self._copies[before.n]
         tied, relations = self._ties.closure(before.right, variables)
         if any(v in states for _, mentioned in relations for v in mentioned):
@@ -77,8 +101,9 @@ class _RightLimits:
         return {id(v): known[v] for v in variables for known in (states, copies) if v in known}
 
     def _copy(self, boundary, v):
-        self._home.place.add(len(self._copies[boundary]) + 1)
-        copy = self._home.copy[boundary, len(self._copies[boundary]) + 1]
+        place = len(self._copies[boundary]) + 1
+        self._home.place.add(place)
+        copy = self._home.copy[boundary, place]
         copy.bounds, copy.value = (v.lower, v.upper), v.value
         return copy
 
@@ -93,41 +118,57 @@ class _RightLimits:
                 self._home.copied.add((boundary, place), replace_expressions(row.expr, swap))
 
 
+class _Continuous:
+    """Which variables are continuous in time but for the jumps of states, at any label."""
+
+    def __init__(self, model, times, continuity, given):
+        self._times, self.continuity = times, continuity
+        self.given = ComponentSet([*(d.get_state_var() for d in derivatives(model, times.wrt)), *given])
+        self._names = {
+            id(found): {times.split(v)[1] for some in (found.given, found.tied) for v in some if not v.is_indexed()}
+            for found in (continuity.inside, continuity.across)
+        }
+
+    def inside(self, v):
+        """Inside every control stage."""
+        return self._in(v, self.continuity.inside)
+
+    def across(self, v):
+        """At the boundaries of control stages too."""
+        return self._in(v, self.continuity.across)
+
+    def _in(self, v, found):
+        return self._times.time(v) is None or v in found or self._times.split(v)[1] in self._names[id(found)]
+
+
 class _Ties:
     """Which continuous algebraic variables hang together at the labels of inner boundaries."""
 
-    def __init__(self, model, times, grid, continuity, given):
-        self._times, self._inside = times, continuity.inside
-        known = (v for some in (continuity.inside.given, continuity.inside.tied) for v in some)
-        self._names = {times.split(v)[1] for v in known if not v.is_indexed()}
-        self._given = ComponentSet([*(d.get_state_var() for d in derivatives(model, times.wrt)), *given])
-        self._parts = ComponentSet(v for v, rule in continuity.rules.items() if rule.ctype is Constraint)
+    def __init__(self, model, times, grid, continuous):
+        self._times, self._continuous = times, continuous
+        rules = continuous.continuity.rules
+        self._parts = ComponentSet(v for v, rule in rules.items() if rule.ctype is Constraint)
         self._relations = defaultdict(ComponentMap)
         labels = {e.right for e in grid.elements[:-1]}
         for row in model.component_data_objects(Constraint, active=True, descend_into=Block):
             label = times.time(row)
             if label in labels and row.equality and not row.parent_component().local_name.endswith(DISCRETISATION):
                 self._add(label, row, _variables(row.body))
-        for s, rule in continuity.rules.items():
+        for s, rule in rules.items():
             if rule.ctype is Complementarity:
                 for v in (v for v in s.values() if times.time(v) in labels):
                     self._add(times.time(v), None, [u for side in rule[v.index()]._args for u in _variables(side)])
 
     def _add(self, label, row, mentioned):
         """A relation between continuous variables; rows with others (nu, rates) tell nothing about these."""
-        if all(map(self._continuous, mentioned)):
+        if all(map(self._continuous.inside, mentioned)):
             relation = (row, mentioned)
             for v in mentioned:
                 if self._algebraic(v):
                     self._relations[label].setdefault(v, []).append(relation)
 
-    def _continuous(self, v):
-        if self._times.time(v) is None or v in self._inside:
-            return True
-        return self._times.split(v)[1] in self._names
-
     def _algebraic(self, v):
-        return self._times.time(v) is not None and v.parent_component() not in self._given
+        return self._times.time(v) is not None and v.parent_component() not in self._continuous.given
 
     def closure(self, label, wanted):
         """The algebraic variables at ``label`` that ``wanted`` depend on, and the relations ``(row, variables)`` between them."""

@@ -4,6 +4,7 @@ from pyomo.common.config import ConfigDict, ConfigValue, In, NonNegativeFloat, P
 from pyomo.common.modeling import unique_component_name
 from pyomo.core import Block, Transformation, TransformationFactory
 from pyomo.gdp import Disjunction
+from pyomo.mpec.complementarity import ComplementarityData
 
 from pyomo_fesd import marks, records
 from pyomo_fesd.elements.continuity import check_told, inner_label, read_continuity
@@ -21,14 +22,14 @@ from pyomo_fesd.elements.families import (
 )
 from pyomo_fesd.elements.free_time import check_free_time, factors
 from pyomo_fesd.elements.grid import check_resolution, read_grid, share_elements
-from pyomo_fesd.elements.jumps import add_jumps, read_jumps
+from pyomo_fesd.elements.jumps import add_jumps, check_guards, read_jumps
 from pyomo_fesd.elements.lengths import add_lengths, check_orders, multiply_derivatives
 from pyomo_fesd.elements.memory import add_memory, read_modes
 from pyomo_fesd.elements.mixed import split_mixed
 from pyomo_fesd.elements.moves import add_moves
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
 from pyomo_fesd.elements.restore import restored_on_error
-from pyomo_fesd.elements.right_limits import start_after_jumps
+from pyomo_fesd.elements.right_limits import RightLimits
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set
 
@@ -190,8 +191,10 @@ class FiniteElements(Transformation):
 
             pairs, mixed = conditions_over_time(instance, times)
             modes, jumps = read_modes(instance.model(), wrt), read_jumps(instance.model(), wrt)
+            check_guards(jumps, config.piecewise_constant)
             self._refuse_waiting(instance, wrt, pairs or mixed or modes or jumps)
-            continuity = self._continuity(instance, times, [*pairs.values(), *mixed.values()], grid, config)
+            conditions = [*pairs.values(), *mixed.values(), *(m.conditions for m in modes), *(j.guards for j in jumps)]
+            continuity = self._continuity(instance, times, conditions, grid, config)
             families = read_families(pairs | split_mixed(mixed, continuity, times), continuity, times)
             if not grid.right_is_stage:
                 warn_gauss_on_curved_surfaces(families, continuity, times)
@@ -199,8 +202,9 @@ class FiniteElements(Transformation):
             hold_controls(block, config.piecewise_constant, grid, wrt)
             multiply_derivatives(instance.model(), wrt, block, grid)
             add_jumps(block, jumps, grid, wrt)
-            families = start_after_jumps(block, families, jumps, grid, times, continuity, config)
-            add_memory(block, modes, grid, wrt)
+            limits = RightLimits(block, jumps, grid, times, continuity, [*config.piecewise_constant, *config.continuous])
+            families = list(map(limits.family, families))
+            add_memory(block, modes, limits, grid, wrt)
             add_cross_complementarity(block, families, grid, wrt, config.cross_complementarity)
             if families or modes or jumps:
                 add_equilibration(block, families, modes, grid, config.equilibration, config.rho)
@@ -239,7 +243,8 @@ class FiniteElements(Transformation):
     def _continuity(instance, times, families, grid, config):
         """What is continuous where the families begin, by the equations there if they can matter."""
         labels = {inner_label(family, times.wrt) for family in families}
-        written = not all(marks.is_generated(condition) for family in families for condition in family.values())
+        found = (condition for family in families for condition in family.values())
+        written = not all(isinstance(c, ComplementarityData) and marks.is_generated(c) for c in found)
         trace = written or (bool(families) and (len(grid.stages) > 1 or not grid.right_is_stage))
         return read_continuity(instance.model(), times, labels, config.piecewise_constant, config.continuous, trace)
 

@@ -6,6 +6,7 @@ An element ends at the latest where one of its stage points has arrived.
 
 from pyomo.core import value
 
+from pyomo_fesd.elements.memory import LEFT, RIGHT
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.march.equations import own_labels
 
@@ -74,22 +75,27 @@ class Memory:
 
     def arrived(self, element):
         """For each condition of the active mode the place in (left, own labels) where it has fallen to zero, or None."""
-        labels, found = (element.left, *own_labels(element)), []
+        found = []
         for mode in self._modes:
-            for k, values in enumerate(zip(*(_conditions(mode, t) for t in labels))):
-                place = self._arrivals.first((mode.name, k), values)
+            values = [self._after(mode, element.n - 1, element.left), *(_conditions(mode, t) for t in own_labels(element))]
+            for k, row in enumerate(zip(*values)):
+                place = self._arrivals.first((mode.name, k), row)
                 found += [place] if mode is self._active else []
         return found
 
-    def end(self, label):
-        """The active mode has ended at ``label``: another one begins.
+    def ends_beyond(self, boundary, label):
+        """Whether a condition of the active mode, zero or not on the left of a boundary, is negative on its right."""
+        return any(c < 0 for c in self._room(self._active, boundary, label))
+
+    def end(self, boundary, label):
+        """The active mode has ended at a boundary: another one begins.
 
         Raises
         ------
         FesdError
             if none or several can follow
         """
-        room = [(m, min(self._room(m, label), default=1.0)) for m in self._modes if m is not self._active]
+        room = [(m, min(self._room(m, boundary, label), default=1.0)) for m in self._modes if m is not self._active]
         inside = [m for m, space in room if space > 0]
         possible = inside or [m for m, space in room if space >= 0]
         if len(possible) != 1:
@@ -101,10 +107,19 @@ class Memory:
             )
         self._active = possible[0]
 
-    def _room(self, mode, label):
-        """Values of the conditions; 0 for those that are zero."""
-        for k, c in enumerate(_conditions(mode, label)):
-            yield 0.0 if abs(c) <= self._arrivals.zero((mode.name, k), [c]) else c
+    def _after(self, mode, boundary, label):
+        """Values of the conditions right of a boundary."""
+        left = _conditions(mode, label)
+        places = ((mode.name, boundary, k) for k in range(1, len(left) + 1))
+        beyond = self._home.beyond
+        return [value(beyond[place]) if place in beyond else c for place, c in zip(places, left)]
+
+    def _room(self, mode, boundary, label):
+        """The same with 0 for those that are zero."""
+        return [self._rounded(mode, k, c) for k, c in enumerate(self._after(mode, boundary, label))]
+
+    def _rounded(self, mode, k, c):
+        return 0.0 if abs(c) <= self._arrivals.zero((mode.name, k), [c]) else c
 
     def settle(self, grid, first):
         """What the law of switching between elements says at the values of the march: n and d at every boundary."""
@@ -113,10 +128,13 @@ class Memory:
             weights = [value(mode.weight(e)) for e in grid.elements]
             for b, label in enumerate(labels):
                 left = 0 < b < len(grid.elements) and weights[b - 1] > weights[b]
-                for k, c in enumerate(self._room(mode, label), start=1):
-                    self._home.n[mode.name, b, k].set_value(max(-c, 0.0), skip_validation=True)
-                    if (mode.name, b, k) in self._home.d:
-                        self._home.d[mode.name, b, k].set_value(float(left and c == 0), skip_validation=True)
+                for side, values in ((LEFT, _conditions(mode, label)), (RIGHT, self._after(mode, b, label))):
+                    for k, c in enumerate(values, start=1):
+                        index, c = (mode.name, b, k, side), self._rounded(mode, k - 1, c)
+                        if index in self._home.n:
+                            self._home.n[index].set_value(max(-c, 0.0), skip_validation=True)
+                        if index in self._home.d:
+                            self._home.d[index].set_value(float(left and c <= 0), skip_validation=True)
 
 
 def _conditions(mode, label):

@@ -191,8 +191,8 @@ class March:
             return h, []
         happened = self._jumps.end(element, jumped)
         for memory, found in arrived:
-            if last in found:
-                memory.end(element.right)
+            if last in found or memory.ends_beyond(element.n, element.right):
+                memory.end(element.n, element.right)
                 happened.append(memory.name)
         return h, happened
 

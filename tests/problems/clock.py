@@ -13,7 +13,5 @@ SWITCH, FINAL = 1.0, 7.0
 def build():
     m = over_time(2, c=0, x=-1)
     m.clock = pyo.Constraint(m.t, rule=lambda m, t: m.dc[t] == 1)
-    m.zero = Disjunction(
-        m.t, rule=lambda m, t: [[m.x[t] <= 0, m.dx[t] == 2 * m.c[t]], [m.x[t] >= 0, m.dx[t] == 3 * m.c[t] ** 2]]
-    )
+    m.zero = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 0, m.dx[t] == 2 * m.c[t]], [m.x[t] >= 0, m.dx[t] == 3 * m.c[t] ** 2]])
     return m
