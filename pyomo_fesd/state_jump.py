@@ -15,9 +15,9 @@ def state_jump(*sets, guard, reset):
     ----------
     sets : Set, ...
         index sets, the ContinuousSet among them
-    guard : function (block, *index) -> expression
+    guard : function (block, index, ...) -> expression
         block is the parent, as in every Pyomo rule
-    reset : function (block, *index) -> list of (VarData, expression)
+    reset : function (block, index, ...) -> list of (VarData, expression)
         the states that jump with their values J after the jump, written with the values before it
 
     Returns
