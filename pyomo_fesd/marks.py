@@ -15,7 +15,8 @@ MEMORY             Expression (data)         the conditions c >= 0 of a mode wit
 GUARD              Expression (data)         ``True``: a jump of the state happens where this falls to 0 from above
 RESET              Var (data)                the Expression of the value after the jump whose guard stands on the same block
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
-MOVE               Complementarity (data)    another pair whose zero side it may take over; all on one block do so together
+MOVE               Complementarity (data)    another pair whose zero side it may take over, or None if its first side may become
+                                             zero; all on one block do so together
                    Var (data)                where the move starts it; ``True``: worth a look only where it is at its lower bound
 ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
                                              certificate looks beyond them

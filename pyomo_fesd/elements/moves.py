@@ -43,13 +43,13 @@ def _start_short(home, block, grid, changed):
         marks.mark(home, marks.MOVE, block.r[e.n], least if least is not None else (total - rest) / (len(stage) - 1) / e.length)
 
 
-#: Pairs that belong to elements and pairs that belong to boundaries, by the block below that of the grid that holds them.
+#: Pairs of elements and pairs of boundaries, by the block below that of the grid that holds them.
 ELEMENTS = ((None, 'cross'), ('memory', 'binary'))
 BOUNDARIES = (('memory', 'parts'), ('memory', 'region'), ('memory', 'leaving'), ('jumps', 'happens'), ('jumps', 'binary'))
 
 
 def _pairs(block, changed, boundary, step):
-    """``(pair, pair whose zero side it takes over)`` of one move."""
+    """``(pair, pair whose zero side it takes over)`` of one move; None where nothing happens at the end of the horizon."""
     for names in ELEMENTS:
         yield from _like(block, names, changed, changed - step)
     for names in BOUNDARIES:
@@ -62,6 +62,6 @@ def _like(block, names, number, other):
     home = block.component(names[0]) if names[0] else block
     pairs = home.component(names[1]) if home is not None else None
     for index, pair in pairs.items() if pairs is not None else ():
-        beside = (index[0], other, *index[2:])
-        if index[1] == number and beside in pairs:
-            yield pair, pairs[beside]
+        if index[1] == number:
+            beside = (index[0], other, *index[2:])
+            yield pair, pairs[beside] if beside in pairs else None
