@@ -63,7 +63,9 @@ def _resets(block, given):
     if not pairs or not all(map(_is_pair, pairs)):
         shown = str([str(part) for part in given] if isinstance(given, (list, tuple)) else given)
         raise FesdError(
-            block, f"its reset is {shown}, not a list of (state, value after)", "e.g. [(m.v[t], -m.v[t])], written with values before"
+            block,
+            f"its reset is {shown}, not a list of (state, value after)",
+            "e.g. [(m.v[t], -m.v[t])], written with values before",
         )
     known = ComponentSet()
     for state, _ in pairs:
