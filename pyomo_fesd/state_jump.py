@@ -1,8 +1,10 @@
 """State jumps as a user writes them: a guard and a law of reset."""
 
+from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Expression
 
 from pyomo_fesd import marks
+from pyomo_fesd.errors import FesdError
 
 
 def state_jump(*sets, guard, reset):
@@ -24,6 +26,11 @@ def state_jump(*sets, guard, reset):
     -------
     Block over ``sets``, to be added to the model: ``m.impact = state_jump(m.t, guard=..., reset=...)``
 
+    Raises
+    ------
+    FesdError
+        when the Block is added: for a guard that is no expression, and a reset that is no list of states with values
+
     Example
     -------
     A ball: ``state_jump(m.t, guard=lambda m, t: m.q[t], reset=lambda m, t: [(m.v[t], -0.9*m.v[t])])``
@@ -33,9 +40,9 @@ def state_jump(*sets, guard, reset):
 
     def rule(block, *index):
         parent = block.parent_block()
-        block.guard = Expression(expr=guard(parent, *index))
+        block.guard = Expression(expr=_guard(block, guard(parent, *index)))
         marks.mark(block, marks.GUARD, block.guard)
-        resets = reset(parent, *index)
+        resets = _resets(block, reset(parent, *index))
         values = Expression(range(1, len(resets) + 1))
         block.add_component(marks.GENERATED + 'after', values)
         for j, (state, after) in enumerate(resets, start=1):
@@ -43,3 +50,40 @@ def state_jump(*sets, guard, reset):
             marks.mark(block, marks.RESET, state, values[j])
 
     return Block(*sets, rule=rule)
+
+
+def _guard(block, given):
+    if not _is_numeric(given):
+        raise FesdError(block, f"its guard is '{given}', not an expression", "give c for the condition c >= 0")
+    return given
+
+
+def _resets(block, given):
+    pairs = list(given) if isinstance(given, (list, tuple)) else []
+    if not pairs or not all(map(_is_pair, pairs)):
+        shown = str([str(part) for part in given] if isinstance(given, (list, tuple)) else given)
+        raise FesdError(
+            block,
+            f"its reset is {shown}, not a list of (state, value after)",
+            "e.g. [(m.v[t], -m.v[t])], written with values before",
+        )
+    known = ComponentSet()
+    for state, _ in pairs:
+        if state in known:
+            raise FesdError(block, f"'{state.name}' is reset twice", "give each state one value after the jump")
+        known.add(state)
+    return pairs
+
+
+def _is_pair(given):
+    return isinstance(given, (list, tuple)) and len(given) == 2 and _is_variable(given[0]) and _is_numeric(given[1])
+
+
+def _is_variable(given):
+    return getattr(given, 'is_variable_type', bool)() and not given.is_indexed()
+
+
+def _is_numeric(given):
+    if hasattr(given, 'is_expression_type'):
+        return given.is_numeric_type() and not given.is_indexed()
+    return isinstance(given, (int, float))

@@ -46,7 +46,7 @@ def _start_short(home, block, grid, changed):
         marks.mark(home, marks.MOVE, block.r[e.n], least if least is not None else (total - rest) / (len(stage) - 1) / e.length)
 
 
-#: Pairs that belong to elements and pairs that belong to boundaries, by the block below that of the grid that holds them.
+#: Pairs of elements and pairs of boundaries, by the block below that of the grid that holds them.
 ELEMENTS = ((None, 'cross'), ('memory', 'binary'))
 BOUNDARIES = (('memory', 'parts'), ('memory', 'region'), ('memory', 'leaving'), ('jumps', 'happens'), ('jumps', 'binary'))
 
@@ -61,7 +61,7 @@ def _by_number(block, names):
 
 
 def _pairs(places, changed, boundary, step):
-    """``(pair, pair whose zero side it takes over)`` of one move."""
+    """``(pair, pair whose zero side it takes over)`` of one move; None where nothing happens at the end of the horizon."""
     for names in ELEMENTS:
         yield from _like(places[names], changed, changed - step)
     for names in BOUNDARIES:
@@ -70,5 +70,5 @@ def _pairs(places, changed, boundary, step):
 
 
 def _like(pairs, number, other):
-    """Pairs of one number, beside those of another that agree with them in everything else."""
-    return ((pair, pairs[other][rest]) for rest, pair in pairs[number].items() if rest in pairs[other])
+    """Pairs of one number, beside those of another that agree with them in everything else, or None."""
+    return ((pair, pairs[other].get(rest)) for rest, pair in pairs[number].items())

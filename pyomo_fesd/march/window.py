@@ -9,6 +9,8 @@ Leaves: values in the user's model, nothing else.
 """
 
 import pyomo.environ as pyo
+from pyomo.contrib.solver.common.factory import SolverFactory
+from pyomo.contrib.solver.common.results import TerminationCondition
 from pyomo.core.expr.visitor import replace_expressions
 from pyomo.mpec import Complementarity, complements
 
@@ -62,12 +64,12 @@ class Window:
             m.step = pyo.Objective(expr=m.unknown[0], sense=pyo.maximize)
         for k, v in enumerate(pattern.unknown):
             m.unknown[k].set_value(v.value, skip_validation=True)
-        self._solver = pyo.SolverFactory('mpec_hybrid', **(OPTIONS | options))
+        self._solver = SolverFactory('mpec_hybrid', **(OPTIONS | options))
         m.known.fix(0.0)
         self._solver.set_instance(m, parameters=[m.known])
 
     def solve(self, equations, most=None, **options):
-        """Solve for other ``equations`` of the kind, with a length multiplier up to ``most``; returns the results."""
+        """Solve for other ``equations`` of the kind, with a length multiplier up to ``most``; returns what is known of the answer."""
         for k, v in enumerate(equations.known):
             if v.value is None:
                 raise FesdError(v, "simulate: this input has no value", "give it one")
@@ -75,7 +77,10 @@ class Window:
         if self._steps:
             self.model.unknown[0].setub(most)
             self.model.unknown[0].set_value(most)
-        return self._solver.solve(self.model, **options)
+        results = self._solver.solve(self.model, **options)
+        if results.termination_condition is TerminationCondition.interrupted:
+            raise KeyboardInterrupt
+        return results.extra_info
 
     @property
     def length(self):

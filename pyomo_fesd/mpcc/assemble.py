@@ -89,18 +89,21 @@ def _are_sides(sides, layout):
 
 def _moves(problem, conditions, variables, s_x):
     """``problem.moves`` in terms of the places that the pairs have."""
+    if not problem.moves:
+        return []
     places = {}
     for k, condition in enumerate(conditions):
         places.setdefault(id(condition.source), []).append(k)
-    columns = {id(v): j for j, v in enumerate(variables)} if problem.moves else {}
+    columns = {id(v): j for j, v in enumerate(variables)}
     found = []
     for move in problem.moves:
-        both = [ends for one, other in move for ends in zip(places.get(id(one), ()), places.get(id(other), ()))]
-        if both:
-            targets, sources = zip(*both)
-            short = [columns[id(v)] for v, at in move if id(v) in columns and at is True]
-            starts = {columns[id(v)]: at for v, at in move if id(v) in columns and at is not True}
-            indices = [np.array(list(ends), dtype=int) for ends in (targets, sources, short, starts)]
+        taken = [ends for one, other in move for ends in zip(places.get(id(one), ()), places.get(id(other), ()))]
+        ended = [k for one, other in move if other is None for k in places.get(id(one), ())]
+        short = [columns[id(v)] for v, at in move if at is True and id(v) in columns]
+        starts = {columns[id(v)]: at for v, at in move if at is not True and id(v) in columns}
+        if taken:
+            targets, sources = zip(*taken)
+            indices = [np.array(list(ends), dtype=int) for ends in (targets, sources, ended, short, starts)]
             found.append(Move(*indices, np.array(list(starts.values())) * s_x[indices[-1]]))
     return found
 

@@ -7,7 +7,7 @@ from collections import Counter
 
 import numpy as np
 
-from pyomo_fesd.mpcc.active_set import active_sets
+from pyomo_fesd.mpcc.active_set import G_ZERO, active_sets
 from pyomo_fesd.mpcc.run import Outcome, Point, Stop
 from pyomo_fesd.mpcc.search import leaves
 from pyomo_fesd.mpcc.stationarity import Stationarity
@@ -88,17 +88,24 @@ class Branches:
         moves = list(self._c.moves)
         while moves:
             point, move = self.run.point, moves.pop(0)
-            zero = active_sets(*self._sides(point.w), self._tolerances.biactive).zero
-            beside = zero.copy()
-            beside[move.targets] = zero[move.sources]
-            if move.short.size and np.all(point.w[move.short] > self._c.lbx[move.short] + SHORT):
-                continue
-            if not np.array_equal(beside, zero) and not self.tried(beside):
+            zero = self._beside(point, move)
+            if zero is not None and not self.tried(zero):
                 start = point.w.copy()
                 start[move.starts] = move.at
-                self._improve_from(self._point(start, beside, None, True), False)
+                self._improve_from(self._point(start, zero, None, True), False)
                 if self.run.point.f < point.f - PROGRESS * max(1.0, abs(point.f)):
                     moves = list(self._c.moves)
+
+    def _beside(self, point, move):
+        """The branch that a move leads to from ``point``; None if it is not worth a look."""
+        if move.short.size and np.all(point.w[move.short] > self._c.lbx[move.short] + SHORT):
+            return None
+        sets = active_sets(*self._sides(point.w), self._tolerances.biactive)
+        beside = sets.zero.copy()
+        beside[move.ended] = G_ZERO
+        beside[move.targets] = sets.zero[move.sources]
+        # of a bi-active pair the point has both sides already
+        return beside if np.any((beside != sets.zero) & ~sets.gamma) else None
 
     def search(self, *starts):
         """Look for any feasible branch: by the LPEC with every pair as a binary, and depth first over the pairs."""

@@ -72,6 +72,8 @@ class Move:
     ----------
     targets, sources : int arrays
         pairs
+    ended : int array
+        pairs whose first side becomes zero
     short : int array
         variables; unless one of them is at its lower bound the move is not worth a look (none: always)
     starts : int array
@@ -82,6 +84,7 @@ class Move:
 
     targets: np.ndarray
     sources: np.ndarray
+    ended: np.ndarray
     short: np.ndarray
     starts: np.ndarray
     at: np.ndarray
