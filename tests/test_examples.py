@@ -4,6 +4,7 @@ import importlib
 
 import flash
 import gas_liquid_tank
+import gearbox_car
 import gene_network
 import numpy as np
 import oscillator
@@ -28,6 +29,10 @@ RADAU, LEGENDRE = 'LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE'
         ('flash', 'It boils from 37.89257'),
         ('projected_ellipse', 'time 0.42743'),
         ('pump_curve', 'time 2.566377815: q = 30  above -> below'),
+        ('thermostat', 'time 0.7707533991: relay  heating -> cooling'),
+        ('bouncing_ball', 'q(3 s) = 0.5386263507 m'),
+        ('batch_reactor', 'Product: 106.495000 mol'),
+        ('gearbox_car', 'three fitting stages: T = 10.133333 s'),
         ('gene_network', 'gene 1 is expressed for 0.900000'),
     ],
 )
@@ -156,3 +161,9 @@ def test_the_heaviside_form_of_the_gene_network_is_a_third_smaller():
     for name, saved in per_time.items():
         assert sizes['stewart'][name] - sizes['heaviside'][name] == 2 * saved * labels
     assert sizes['stewart']['pairs'] == sizes['heaviside']['pairs']
+
+
+def test_the_gearbox_car_comes_within_a_percent_with_ten_stages_and_is_exact_with_three_that_fit():
+    equal, fitting = gearbox_car.solve()[0].T.value, gearbox_car.solve(gearbox_car.FITTING)[0].T.value
+    assert gearbox_car.BEST < equal < 1.01 * gearbox_car.BEST
+    assert fitting == pytest.approx(gearbox_car.BEST, abs=1e-8)
