@@ -147,7 +147,7 @@ def _number(expr):
         result = None if expr is None else value(expr, exception=False)
     except (ArithmeticError, ValueError):
         result = None
-    return np.nan if result is None or isinstance(result, complex) else result
+    return np.nan if result is None or isinstance(result, complex) else float(result)
 
 
 def _elements(wrt, times):
