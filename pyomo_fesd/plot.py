@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from pyomo_fesd.elements.grid import read_grid
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import derivatives, find_continuous_set
-from pyomo_fesd.trajectory import element_lengths, switches, trajectory
+from pyomo_fesd.trajectory import element_lengths, rows_over_time, switches, trajectory
 
 
 def plot(model, wrt=None, names=None, units=None):
@@ -39,7 +39,7 @@ def plot(model, wrt=None, names=None, units=None):
     axes = np.atleast_1d(figure.subplots(len(groups), 1, sharex=True))
     for axis, (name, columns) in zip(axes, groups):
         for column in columns:
-            _draw(axis, frame, column, wrt)
+            _draw(axis, frame, column, model, wrt)
         axis.set_ylabel((units or {}).get(name, name))
         if len(columns) > 1:
             axis.legend(fontsize='small')
@@ -66,13 +66,14 @@ def _columns(frame, name):
     return found
 
 
-def _draw(axis, frame, column, wrt):
+def _draw(axis, frame, column, model, wrt):
     """States as lines through all points; multipliers element by element, as they jump at boundaries."""
     label = column.split(': ')[-1]
     if ': ' not in column:
         axis.plot(frame.index, frame[column], '.-', markersize=3, linewidth=1.2, label=label)
         return
-    color, row = axis._get_lines.get_next_color(), {t: k for k, t in reversed(list(enumerate(frame['label'])))}
+    color = axis._get_lines.get_next_color()
+    row = {r.label: k for k, r in enumerate(rows_over_time(model, wrt)) if r.after is None}
     for k, element in enumerate(read_grid(wrt, [wrt.first(), wrt.last()]).elements):
         inside = [row[t] for t in dict.fromkeys((*element.points, element.right))]
         values = frame[column].iloc[[inside[0], *inside]]

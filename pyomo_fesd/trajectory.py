@@ -1,5 +1,6 @@
 """Results on physical time: where the labels lie, what the trajectories are, when the modes switch."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -91,43 +92,68 @@ def trajectory(model, wrt=None):
 
     They are named without their time index (``x``, ``unit.F[a]``); each Disjunction adds the multipliers of its modes
     (``sgn: below``), 1 where the mode is active, 0 where it is not, between in a sliding mode.  The columns ``element`` and
-    ``label`` tell where a row comes from.
+    ``label`` tell where a row comes from.  Where a state jumps there is a second row, with the states after the jump only.
 
     Returns
     -------
     pandas.DataFrame, index ``time``
     """
     wrt = find_continuous_set(model, wrt, 'trajectory')
-    times = physical_time(model, wrt)
+    times, rows = physical_time(model, wrt), rows_over_time(model, wrt)
     index = TimeIndex(wrt)
     found = model.component_objects((Var, Expression), descend_into=Block)
     owned = (v for v in found if not v.is_reference() and not marks.is_generated(v))
     families = index.families(data for v in owned for data in v.values())
-    columns = {'label': list(times), 'element': _elements(wrt, times)}
+    columns = {'label': [r.label for r in rows], 'element': [r.element for r in rows]}
     for name, values in families.items():
-        columns[strip_time(name)] = [_number(values.get(t)) for t in times]
+        columns[strip_time(name)] = [r.number(values.get(r.label)) for r in rows]
     for name, modes in _multipliers(model, index).items():
         for mode, weights in modes.items():
-            columns[f'{name}: {mode}'] = [_number(weights.get(t)) for t in times]
-    frame = pd.DataFrame(columns, index=pd.Index(times.values(), name='time'))
-    return _with_values_after(frame, model, wrt)
+            columns[f'{name}: {mode}'] = [r.number(weights.get(r.label)) for r in rows]
+    return pd.DataFrame(columns, index=pd.Index([times[r.label] for r in rows], name='time'))
 
 
-def _with_values_after(frame, model, wrt):
-    """A second row, for the states only, where a state jumps: the values after it."""
-    states = {strip_time(TimeIndex(wrt).split(x)[1]) for d in derivatives(model, wrt) for x in d.get_state_var().values()}
-    rows = []
-    for element, label, _, values in jumps_that_happen(model, wrt):
-        place = int(np.flatnonzero(frame['label'] == label)[0])
-        row = frame.iloc[[place]].copy()
-        row.loc[:, [c for c in frame.columns if c not in states | {'label', 'element'}]] = np.nan
-        row['element'] = element.n + 1
-        for x, after in values:
-            row[strip_time(TimeIndex(wrt).split(x)[1])] = after
-        rows.append((place, row))
-    for place, row in reversed(rows):
-        frame = pd.concat([frame.iloc[: place + 1], row, frame.iloc[place + 1 :]])
-    return frame
+@dataclass(frozen=True)
+class Row:
+    """One row of a trajectory.
+
+    Attributes
+    ----------
+    label : float
+    element : int
+    after : ComponentMap or None
+        in a second row the states after the jump
+    """
+
+    label: float
+    element: int
+    after: object = None
+
+    def number(self, expr):
+        """Value of an expression; nan where it has none, and for all but states after a jump."""
+        if self.after is not None:
+            return self.after.get(expr, np.nan)
+        try:
+            result = None if expr is None else value(expr, exception=False)
+        except (ArithmeticError, ValueError):
+            result = None
+        return np.nan if result is None or isinstance(result, complex) else float(result)
+
+
+def rows_over_time(model, wrt):
+    """The rows of a trajectory: one for each label, two where a state jumps."""
+    after = {label: (before.n + 1, values) for before, label, _, values in jumps_that_happen(model, wrt)}
+    states, rows = [d.get_state_var() for d in derivatives(model, wrt)] if after else [], []
+    times = TimeIndex(wrt)
+    for label, element in zip(wrt, _elements(wrt, wrt)):
+        rows.append(Row(label, element))
+        if label in after:
+            number, values = after[label]
+            # what does not jump goes on
+            known = ComponentMap((v, v.value) for x in states for v in x.values() if times.time(v) == label)
+            known.update(values)
+            rows.append(Row(label, number, known))
+    return rows
 
 
 def jumps_that_happen(model, wrt):
@@ -140,14 +166,6 @@ def jumps_that_happen(model, wrt):
         if names:
             after = [(x, value(expr)) for x, expr in values_after(home, jumps, element).items()]
             yield element, element.right, ', '.join(names), after
-
-
-def _number(expr):
-    try:
-        result = None if expr is None else value(expr, exception=False)
-    except (ArithmeticError, ValueError):
-        result = None
-    return np.nan if result is None or isinstance(result, complex) else float(result)
 
 
 def _elements(wrt, times):
