@@ -49,9 +49,9 @@ def build(e=1.0, horizon=HORIZON):
 
 
 def main():
-    """March through twelve elements, solve all of them at once from there, compare with the closed form, draw."""
+    """March through the elements, solve all of them at once from there, compare with the closed form, draw."""
     m = build()
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=12, ncp=2)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=24, ncp=2)
     pyomo_fesd.simulate(m)
     results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=True)
     print(f'mpec_hybrid: {results.solver.reason}; {results.solver.nlps} NLPs.')

@@ -83,7 +83,7 @@ def main():
     print(f'mpec_hybrid: {results.solver.reason}; {results.solver.nlps} NLPs.')
     for switch, exact in zip(pyomo_fesd.switches(m), switching_times()):
         print(f'{switch}, {switch.time - exact:+.1e} off')
-    figure = pyomo_fesd.plot(m, m.t, ['y', 'relay: heating'], units={'y': 'temperature y', 'relay: heating': 'heater on'})
+    figure = pyomo_fesd.plot(m, m.t, ['y', 'relay: heating'], units={'y': 'temperature y (°C)', 'relay: heating': 'heater on'})
     for threshold in (LOW, HIGH):
         figure.axes[0].axhline(threshold, color='C3', linewidth=0.6)
     figure.savefig(PICTURE, dpi=150)

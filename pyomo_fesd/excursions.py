@@ -17,15 +17,16 @@ from pyomo_fesd.elements.cross import grid_of
 from pyomo_fesd.elements.jumps import read_jumps
 from pyomo_fesd.elements.memory import read_modes
 from pyomo_fesd.records import records
-from pyomo_fesd.switching import public_name
+from pyomo_fesd.switching import public_name, size
 from pyomo_fesd.trajectory import jumps_that_happen, physical_time
 
-#: A function below this is zero all along an element.
+#: A function below this part of its largest value is zero all along an element.
 ZERO = 1e-7
 #: An excursion counts if it is larger than this part of the function's largest value in the element.
 EXCURSION = 1e-4
-#: Relative times at which to look.
-INSIDE = np.linspace(0.0, 1.0, 14)[1:-1]
+#: Relative times at which a function is evaluated, and those between them at which its interpolant is.
+NODES = (1 - np.cos(np.pi * (np.arange(12) + 0.5) / 12)) / 2
+INSIDE = np.linspace(0.0, 1.0, 202)[1:-1]
 
 
 def excursions(model, wrt, functions):
@@ -33,8 +34,9 @@ def excursions(model, wrt, functions):
     grid, time = grid_of(records(model).grids[wrt]), physical_time(model, wrt)
     tau, after = np.array([0.0, *grid.tau]), _values_after_jumps(model, wrt)
     for name, kept, sign in _kept(model, wrt, functions):
+        zero = ZERO * size(kept)
         for element in grid.elements:
-            place = _excursion(kept, element, sign(element), tau, after.get(element.n, ComponentMap()))
+            place = _excursion(kept, element, sign(element, zero), zero, tau, after.get(element.n, ComponentMap()))
             if place is not None:
                 when = time[element.left] + place * (time[element.right] - time[element.left])
                 yield (
@@ -50,39 +52,39 @@ def _values_after_jumps(model, wrt):
 
 
 def _kept(model, wrt, functions):
-    """``(name, {label: expression}, function element -> sign)`` of everything that keeps its sign inside an element."""
+    """``(name, {label: expression}, function (element, zero) -> sign)`` of everything that keeps its sign inside an element."""
     for s in functions:
-        yield s.name, s.c, lambda element, c=s.c: _sign(c, element)
+        yield s.name, s.c, lambda element, zero, c=s.c: _sign(c, element, zero)
     for mode in read_modes(model, wrt):
         for k in range(min(map(len, mode.conditions.values()))):
             kept = {t: conditions[k] for t, conditions in mode.conditions.items()}
-            yield public_name(mode.name), kept, lambda element, mode=mode: int(value(mode.weight(element)) > 0.5)
+            yield public_name(mode.name), kept, lambda element, zero, mode=mode: int(value(mode.weight(element)) > 0.5)
     for jump in read_jumps(model, wrt):
-        yield jump.name, jump.guards, lambda element: 1
+        yield jump.name, jump.guards, lambda element, zero: 1
 
 
-def _sign(c, element):
+def _sign(c, element, zero):
     """The sign that c has at the stage points of an element; 0 if it slides."""
     largest = max((value(c[t]) for t in element.points if t in c), key=abs, default=0.0)
-    return 0 if abs(largest) <= ZERO else int(np.sign(largest))
+    return 0 if abs(largest) <= zero else int(np.sign(largest))
 
 
-def _excursion(functions, element, sign, tau, after):
+def _excursion(functions, element, sign, zero, tau, after):
     """The relative time at which sign c is clearly negative inside an element; None if it is not."""
     labels = (element.left, *element.points)
     if sign == 0 or any(t not in functions for t in labels):
         return None
     at_stages = np.array([sign * value(functions[t]) for t in element.points])
     largest = np.abs(at_stages).max()
-    if largest <= ZERO or at_stages.min() > 2 * np.ptp(at_stages):
+    if largest <= zero or at_stages.min() > 2 * np.ptp(at_stages):
         return None  # it rests at zero, or stays far from it
-    values = sign * _between([functions[t] for t in labels], tau, after)
+    values = sign * BarycentricInterpolator(NODES, _between([functions[t] for t in labels], tau, after))(INSIDE)
     worst = int(np.argmin(values))
     return INSIDE[worst] if values[worst] < -EXCURSION * max(largest, np.abs(values).max()) else None
 
 
 def _between(functions, tau, after):
-    """A function at the relative times ``INSIDE``, its variables interpolated between the points of an element.
+    """A function at the relative times ``NODES``, its variables interpolated between the points of an element.
 
     Parameters
     ----------
@@ -95,11 +97,11 @@ def _between(functions, tau, after):
     """
     rows = [list(identify_variables(f, include_fixed=True)) for f in functions]
     points = [[after.get(v, v.value) for v in rows[0]], *([v.value for v in row] for row in rows[1:])]
-    polynomials = [BarycentricInterpolator(tau, column)(INSIDE) for column in zip(*points)]
+    polynomials = [BarycentricInterpolator(tau, column)(NODES) for column in zip(*points)]
     kept = [(v, v.value, v.stale) for v in rows[-1]]
     try:
         found = []
-        for k in range(len(INSIDE)):
+        for k in range(len(NODES)):
             for v, polynomial in zip(rows[-1], polynomials):
                 v.set_value(polynomial[k], skip_validation=True)
             found.append(value(functions[-1]))

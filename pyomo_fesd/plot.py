@@ -7,7 +7,7 @@ from pyomo_fesd.elements.grid import read_grid
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.marks import is_generated
 from pyomo_fesd.timeindex import derivatives, find_continuous_set
-from pyomo_fesd.trajectory import element_lengths, row_of_label, switches, trajectory
+from pyomo_fesd.trajectory import element_lengths, rows_over_time, switches, trajectory
 
 
 def plot(model, wrt=None, names=None, units=None):
@@ -73,7 +73,8 @@ def _draw(axis, frame, column, model, wrt):
     if ': ' not in column:
         axis.plot(frame.index, frame[column], '.-', markersize=3, linewidth=1.2, label=label)
         return
-    color, row = axis._get_lines.get_next_color(), row_of_label(model, wrt)
+    color = axis._get_lines.get_next_color()
+    row = {r.label: k for k, r in enumerate(rows_over_time(model, wrt)) if r.after is None}
     for k, element in enumerate(read_grid(wrt, [wrt.first(), wrt.last()]).elements):
         inside = [row[t] for t in dict.fromkeys((*element.points, element.right))]
         values = frame[column].iloc[[inside[0], *inside]]

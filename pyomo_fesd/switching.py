@@ -3,12 +3,15 @@
 from dataclasses import dataclass
 
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, Constraint
+from pyomo.core import Block, Constraint, value
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
 from pyomo_fesd.complementarity import read
 from pyomo_fesd.timeindex import TimeIndex, strip_time
+
+#: A function that is nowhere larger than this is zero.
+LEAST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,11 @@ def switching_functions(model, wrt):
                 # c == p - n
                 family.nu[label], family.c[label] = nu, equation.body - equation.upper + parts[n.index()] - n
     return list(found.values())
+
+
+def size(functions):
+    """The largest value of a function of time, given as {label: expression}; not less than what solvers leave of zero."""
+    return max([LEAST, *(abs(value(c)) for c in functions.values())])
 
 
 def is_variable(expr):

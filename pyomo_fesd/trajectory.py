@@ -1,5 +1,6 @@
 """Results on physical time: where the labels lie, what the trajectories are, when the modes switch."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -90,53 +91,63 @@ def trajectory(model, wrt=None):
     They are named without their time index (``x``, ``unit.F[a]``); each Disjunction adds the multipliers of its modes
     (``sgn: below``), 1 where the mode is active, 0 where it is not, between in a sliding mode; each condition with two bounds on
     one side adds where it stands (``valve: at lower bound``, ``valve: between``, ``valve: at upper bound``) in the same way.  The
-    columns ``element`` and ``label`` tell where a row comes from.
+    columns ``element`` and ``label`` tell where a row comes from.  Where a state jumps there is a second row, with the states
+    after the jump only.
 
     Returns
     -------
     pandas.DataFrame, index ``time``
     """
     wrt = find_continuous_set(model, wrt, 'trajectory')
-    times = physical_time(model, wrt)
+    times, rows = physical_time(model, wrt), rows_over_time(model, wrt)
     index = TimeIndex(wrt)
     found = model.component_objects((Var, Expression), descend_into=Block)
     owned = (v for v in found if not v.is_reference() and not marks.is_generated(v))
     families = index.families(data for v in owned for data in v.values())
-    elements = _elements(wrt, times)
-    columns = {'label': list(times), 'element': elements}
-    for name, values in families.items():
-        columns[strip_time(name)] = [number(values.get(t)) for t in times]
     inside = _grid(wrt).elements if _has_elements(wrt) else ()
+    columns = {'label': [r.label for r in rows], 'element': [r.element for r in rows]}
+    for name, values in families.items():
+        columns[strip_time(name)] = [r.number(values.get(r.label)) for r in rows]
     for name, modes in (_multipliers(model, index) | positions(model, wrt, index, inside)).items():
         for mode, weights in modes.items():
-            columns[f'{name}: {mode}'] = [number(weights.get(t)) for t in times]
-    frame = pd.DataFrame(columns, index=pd.Index(times.values(), name='time'))
-    return _with_values_after(frame, model, wrt)
+            columns[f'{name}: {mode}'] = [r.number(weights.get(r.label)) for r in rows]
+    return pd.DataFrame(columns, index=pd.Index([times[r.label] for r in rows], name='time'))
 
 
-def _with_values_after(frame, model, wrt):
-    """A second row, for the states only, where a state jumps: the values after it."""
-    states = {strip_time(TimeIndex(wrt).split(x)[1]) for d in derivatives(model, wrt) for x in d.get_state_var().values()}
-    rows, place_of = [], {t: k for k, t in enumerate(wrt)}
-    for element, label, _, values in jumps_that_happen(model, wrt):
-        place = place_of[label]
-        row = frame.iloc[[place]].copy()
-        row.loc[:, [c for c in frame.columns if c not in states | {'label', 'element'}]] = np.nan
-        row['element'] = element.n + 1
-        for x, after in values:
-            row[strip_time(TimeIndex(wrt).split(x)[1])] = after
-        rows.append((place, row))
-    for place, row in reversed(rows):
-        frame = pd.concat([frame.iloc[: place + 1], row, frame.iloc[place + 1 :]])
-    return frame
+@dataclass(frozen=True)
+class Row:
+    """One row of a trajectory.
+
+    Attributes
+    ----------
+    label : float
+    element : int
+    after : ComponentMap or None
+        in a second row the states after the jump
+    """
+
+    label: float
+    element: int
+    after: object = None
+
+    def number(self, expr):
+        """Value of an expression; nan where it has none, and for all but states after a jump."""
+        return number(expr) if self.after is None else self.after.get(expr, np.nan)
 
 
-def row_of_label(model, wrt):
-    """Where the row of each label stands in ``trajectory``; a jump has a second row after its own."""
-    second, row, rows = {label for _, label, _, _ in jumps_that_happen(model, wrt)}, 0, {}
-    for label in wrt:
-        rows[label] = row
-        row += 2 if label in second else 1
+def rows_over_time(model, wrt):
+    """The rows of a trajectory: one for each label, two where a state jumps."""
+    after = {label: (before.n + 1, values) for before, label, _, values in jumps_that_happen(model, wrt)}
+    states, rows = [d.get_state_var() for d in derivatives(model, wrt)] if after else [], []
+    times = TimeIndex(wrt)
+    for label, element in zip(wrt, _elements(wrt, wrt)):
+        rows.append(Row(label, element))
+        if label in after:
+            n, values = after[label]
+            # what does not jump goes on
+            known = ComponentMap((v, v.value) for x in states for v in x.values() if times.time(v) == label)
+            known.update(values)
+            rows.append(Row(label, n, known))
     return rows
 
 

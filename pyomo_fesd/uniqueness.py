@@ -24,10 +24,11 @@ from scipy.sparse.linalg import lsqr
 from pyomo_fesd import marks
 from pyomo_fesd.elements.cross import grid_of
 from pyomo_fesd.records import records
+from pyomo_fesd.switching import size
 from pyomo_fesd.timeindex import DISCRETISATION, TimeIndex, derivatives
 from pyomo_fesd.trajectory import physical_time
 
-#: A switching function below this is zero; a multiplier farther than this from 0 and 1 slides.
+#: A switching function below this part of its largest value is zero; a multiplier farther than this from 0 and 1 slides.
 ZERO, SLIDING = 1e-7, 1e-6
 #: Accuracy of the linear equations.
 EXACT = 1e-10
@@ -51,12 +52,12 @@ def not_unique(model, wrt, functions):
 
 def _meetings(s, grid, wrt):
     """``(label, whether it slides)`` where c = 0 and either mode is possible: the first time, and where a slide begins."""
-    first, before = wrt.first(), False
-    if first in s.c and abs(value(s.c[first])) <= ZERO:
+    first, before, zero = wrt.first(), False, ZERO * size(s.c)
+    if first in s.c and abs(value(s.c[first])) <= zero:
         yield first, False
     for element in grid.elements:
         label = element.points[0]
-        slides = label in s.c and SLIDING < s.nu[label].value < 1 - SLIDING and abs(value(s.c[label])) <= ZERO
+        slides = label in s.c and SLIDING < s.nu[label].value < 1 - SLIDING and abs(value(s.c[label])) <= zero
         if slides and not before:
             yield label, True
         before = slides

@@ -26,6 +26,14 @@ def test_rooms_import_nothing_from_each_other(room):
         assert not [n for n in imports(path) if n.startswith(others)], path
 
 
+def test_the_march_looks_at_elements_and_nothing_looks_at_the_march():
+    """Like reports and pictures it reads what the elements recorded; the solver it knows by Pyomo's name only."""
+    for path in (PACKAGE / 'march').glob('*.py'):
+        assert not [n for n in imports(path) if n.startswith(('pyomo_fesd.dcs', 'pyomo_fesd.mpcc', 'pyomo_fesd.solver'))], path
+    others = (p for p in PACKAGE.rglob('*.py') if p.parent.name != 'march')
+    assert [p for p in others if any(n.startswith('pyomo_fesd.march') for n in imports(p))] == [PACKAGE / '__init__.py']
+
+
 def test_only_the_solver_imports_mpcc():
     users = {p.name for p in PACKAGE.glob('*.py') if any(n.startswith('pyomo_fesd.mpcc') for n in imports(p))}
     assert users == {'solver.py'}

@@ -2,9 +2,12 @@
 
 import io
 
+import bouncing_ball
+import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 import signum
+import thermostat
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
 from pyomo.repn.plugins.nl_writer import NLWriter
@@ -51,6 +54,46 @@ def test_marks_of_blocks_below_are_found_and_those_of_inactive_blocks_are_not():
     assert [c.name for c, _ in marks.marked(m.b[2], 'fesd_test')] == ['b[2].x']
     m.b[1].deactivate()
     assert [c.name for c, _ in marks.marked(m, 'fesd_test')] == ['b[2].x']
+
+
+def test_what_is_used_up_is_found_only_when_it_is_asked_for():
+    m = over_two_times()
+    marks.use_up(m, 'fesd_test', m.t)
+    assert [c.name for c, _ in marks.marked(m, 'fesd_test')] == ['b.y[0]']
+    assert [c.name for c, _ in marks.marked(m, 'fesd_test', used=True)] == ['a.x[0]', 'b.y[0]']
+
+
+def test_a_copy_of_what_is_used_up_is_used_up():
+    m = over_two_times()
+    marks.use_up(m, 'fesd_test', m.t)
+    assert [c.name for c, _ in marks.marked(m.clone(), 'fesd_test')] == ['b.y[0]']
+
+
+def over_two_times():
+    """Marks of variables over two different times."""
+    m = pyo.ConcreteModel()
+    m.t, m.s = dae.ContinuousSet(bounds=(0, 1)), dae.ContinuousSet(bounds=(0, 1))
+    m.a, m.b = pyo.Block(), pyo.Block()
+    m.a.x, m.b.y = pyo.Var(m.t), pyo.Var(m.s)
+    marks.mark(m.a, 'fesd_test', m.a.x[0])
+    marks.mark(m.b, 'fesd_test', m.b.y[0])
+    return m
+
+
+def test_a_block_that_is_switched_off_as_a_whole_has_no_marks():
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 1))
+
+    @m.Block(m.t)
+    def b(b, t):
+        b.x = pyo.Var()
+        marks.mark(b, 'fesd_test', b.x)
+
+    m.b.deactivate()
+    # pyomo.dae makes the new data active
+    pyo.TransformationFactory('dae.collocation').apply_to(m, wrt=m.t, nfe=2, ncp=1)
+    assert m.b[0.5].active
+    assert not list(marks.marked(m, 'fesd_test')) and not list(marks.marked(m, 'fesd_test', used=True))
 
 
 def test_suffixes_of_other_names_are_left_alone():
@@ -132,6 +175,26 @@ def test_the_penalty_is_small_and_carries_its_weight():
     assert weight == 0.25 and pyo.value(expr) == 0
     pyo.TransformationFactory('fesd.finite_elements').get_element_lengths(m.t)[1].value = 1.5
     assert pyo.value(expr) == pytest.approx(0.25)
+
+
+def test_modes_with_memory_are_marked_with_their_conditions_and_then_used_up():
+    m = thermostat.build(1)
+    dcs(m, memory=[m.relay])
+    found = list(marks.marked(m, marks.MEMORY))
+    assert len(found) == 2 * len(m.t)
+    assert all(w.ctype is pyo.Expression and all(c.ctype is pyo.Expression for c in cs) for w, cs in found)
+    move(m, 3, 2)
+    assert not list(marks.marked(m, marks.MEMORY))
+    assert len(list(marks.marked(m, marks.MEMORY, used=True))) == 2 * len(m.t)
+
+
+def test_jumps_are_marked_with_guards_and_values_after_and_then_used_up():
+    m = bouncing_ball.build()
+    assert [(g.name, v) for g, v in marks.marked(m, marks.GUARD)] == [(f'impact[{t}].guard', True) for t in m.t]
+    assert [x.name for x, _ in marks.marked(m, marks.RESET)] == [f'v[{t}]' for t in m.t]
+    move(m, 3, 2)
+    assert not list(marks.marked(m, marks.GUARD))
+    assert len(list(marks.marked(m, marks.GUARD, used=True))) == len(m.t)
 
 
 def test_marks_do_not_reach_the_solver_file():

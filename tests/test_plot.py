@@ -1,5 +1,6 @@
 """Pictures of trajectories: what is in which panel."""
 
+import bouncing_ball
 import gas_liquid_tank
 import matplotlib.pyplot
 import numpy as np
@@ -12,8 +13,8 @@ from matplotlib.figure import Figure
 import pyomo_fesd
 from pyomo_fesd import FesdError
 from tests.models import dcs
-from tests.problems import free_start, sliding, two_systems, weir
-from tests.problems.running import LEGENDRE, SCHEMES, move, run, solve
+from tests.problems import air_friction, free_start, sliding, two_systems, weir
+from tests.problems.running import LEGENDRE, SCHEMES, move, run, solve, transform
 
 
 @pytest.fixture(scope='module')
@@ -185,3 +186,24 @@ def test_a_model_without_elements_is_not_drawn(discretise, cause):
 def test_multipliers_on_a_backward_difference_are_drawn():
     m = solve(move(dcs(free_start.build(-2, discretise=difference))))
     assert len(curves(pyomo_fesd.plot(m, m.t, ['sgn: mode 1']).axes[0])) == 3
+
+
+def test_a_state_that_jumps_is_drawn_as_it_is_on_both_sides():
+    m = move(bouncing_ball.build(), 10, 2)
+    pyomo_fesd.simulate(m)
+    figure = pyomo_fesd.plot(m, m.t)
+    assert labels(figure) == ['q', 'v']
+    (line,) = curves(figure.axes[1])
+    time, v = line.get_xdata(), line.get_ydata()
+    at = np.flatnonzero(np.diff(time) == 0)
+    assert time[at].tolist() == pytest.approx(bouncing_ball.impacts(), abs=1e-7)
+    assert v[at + 1].tolist() == pytest.approx((-v[at]).tolist())
+    assert verticals(figure.axes[1], '--') == pytest.approx(bouncing_ball.impacts(), abs=1e-7)
+
+
+def test_multipliers_beside_jumps_are_drawn_element_by_element():
+    m = transform(air_friction.build(), 10, 2)
+    pyomo_fesd.simulate(m)
+    lines = curves(pyomo_fesd.plot(m, m.t, ['drag: mode 1']).axes[0])
+    assert len(lines) == 10
+    assert all(np.ptp(line.get_ydata()) <= 1e-9 for line in lines)

@@ -1,5 +1,6 @@
 """Results on physical time: labels, trajectories and switches."""
 
+import bouncing_ball
 import gas_liquid_tank
 import numpy as np
 import pandas as pd
@@ -14,7 +15,7 @@ import pyomo_fesd
 from pyomo_fesd import FesdError
 from pyomo_fesd.trajectory import Switch, Switches
 from tests.models import dcs
-from tests.problems import crossing, free_start, relay_of_states, sliding, two_systems, weir
+from tests.problems import air_friction, crossing, free_start, relay_of_states, sliding, two_systems, weir
 from tests.problems.running import EXACT_SCHEMES, LEGENDRE, RADAU, move, run, solve, transform
 
 
@@ -342,6 +343,61 @@ def test_switches_print_one_a_line_and_make_a_table():
 def test_two_states_that_are_complementary_switch_once():
     found = pyomo_fesd.switches(solve(move(relay_of_states.build(), 3, 2)))
     assert [s[1:] for s in found] == [('either', 'H > 0', 'G > 0')]
+
+
+# State jumps
+
+
+@pytest.fixture(scope='module')
+def ball():
+    """The bouncing ball, ten Radau elements of two points."""
+    m = move(bouncing_ball.build(), 10, 2)
+    pyomo_fesd.simulate(m)
+    return m
+
+
+def test_where_a_state_jumps_there_are_two_rows(ball):
+    frame = pyomo_fesd.trajectory(ball)
+    assert len(frame) == len(ball.t) + 4
+    assert frame.index.is_monotonic_increasing
+    doubled = frame[frame.index.duplicated(keep=False)]
+    assert sorted(set(doubled.index)) == pytest.approx(bouncing_ball.impacts(), abs=1e-7)
+    before, after = doubled.iloc[0], doubled.iloc[1]
+    assert (before['q'], after['q']) == pytest.approx((0, 0), abs=1e-7)
+    assert after['v'] == pytest.approx(-before['v']) and after['v'] > 0
+    assert (before['label'], before['element'] + 1) == (after['label'], after['element'])
+
+
+def test_after_a_jump_only_the_states_are_told(ball):
+    frame = pyomo_fesd.trajectory(ball)
+    after = frame[frame.index.duplicated()]
+    assert after[['dq', 'dv', 'impact.guard']].isna().all(axis=None)
+    assert not frame[~frame.index.duplicated()].isna().any(axis=None)
+    assert frame['element'].dtype == int
+
+
+def test_a_state_that_does_not_jump_keeps_its_value_and_its_unit_may_be_called_label():
+    m = bouncing_ball.build()
+    m.label = pyo.Var(m.t, initialize=5)
+    m.dlabel = dae.DerivativeVar(m.label)
+    m.label[0].fix(5)
+    m.rest = pyo.Constraint(m.t, rule=lambda m, t: m.dlabel[t] == 0)
+    move(m, 10, 2)
+    frame = pyomo_fesd.simulate(m)
+    assert frame['label'].tolist() == pytest.approx([5] * len(frame))
+
+
+def test_without_a_jump_there_is_one_row_a_time():
+    m = move(bouncing_ball.build(1.0, 0.3), 3, 2)
+    assert len(pyomo_fesd.simulate(m)) == len(m.t)
+
+
+def test_jumps_are_told_in_order_of_time_among_the_switches():
+    m = transform(air_friction.build(), 10, 2)
+    pyomo_fesd.simulate(m)
+    found = pyomo_fesd.switches(m)
+    assert [s.disjunction for s in found] == ['drag', 'impact', 'drag', 'drag', 'impact', 'drag']
+    assert [s.time for s in found] == sorted(s.time for s in found)
 
 
 # Indicator variables

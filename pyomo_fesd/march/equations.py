@@ -11,8 +11,9 @@ Does not apply: to inequalities of the user, which do not determine a simulation
 from collections import defaultdict
 from dataclasses import dataclass
 
-from pyomo.common.collections import ComponentSet
+from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint, value
+from pyomo.core.base.suffix import SuffixFinder
 from pyomo.core.expr.relational_expr import RelationalExpression
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
@@ -35,13 +36,17 @@ class Equations:
     pairs : list of Pair
     conditions : list of Pair
         what the pairs stand for, one for each point
+    length : VarData or None
+        the length multiplier of an element
     unknown : list of VarData
-        what the problem determines; the first is the length multiplier, where there is one
+        what the problem determines
     timed : list of VarData
-        the unknowns that have a time label
+        the unknowns at stage points
     known : list of VarData
     bounds : list of (lower, upper)
         of the unknowns; states have none, as a simulation goes where the equations lead
+    factors : ComponentMap
+        the user's ``scaling_factor`` of variables
     kind : tuple
         equal for problems that differ only in the values of what is known
     """
@@ -49,10 +54,12 @@ class Equations:
     rows: list
     pairs: list
     conditions: list
+    length: object
     unknown: list
     timed: list
     known: list
     bounds: list
+    factors: ComponentMap
     kind: tuple
 
 
@@ -87,6 +94,7 @@ class Reader:
         self._block, self._times, self._given = block, times, given
         self._states = ComponentSet(d.get_state_var() for d in derivatives(model, times.wrt))
         self._equations, self._conditions = defaultdict(list), defaultdict(list)
+        self._factor = SuffixFinder('scaling_factor', None, model.model()).find
         memory = block.component('memory')
         for c in model.component_data_objects(Constraint, active=True, descend_into=Block):
             label = times.time(c)
@@ -103,7 +111,7 @@ class Reader:
     def first(self, label):
         """The algebraic equations of the first time; conditions hold there as they are."""
         conditions = [read(c) for c in self._conditions[label] if c.active]
-        return self._problem(self._equations[label], [], conditions, conditions, (label,), ())
+        return self._problem(self._equations[label], [], conditions, conditions, (label,))
 
     def element(self, element, limits):
         """What holds in an element.
@@ -114,27 +122,29 @@ class Reader:
             that end it, such as guards
         """
         labels, n, jumps = own_labels(element), element.n, self._block.component('jumps')
-        equations, unknown = [c for t in labels for c in self._equations[t]], [self._block.r[n]]
+        equations, copies = [c for t in labels for c in self._equations[t]], []
         if jumps is not None:
             equations += [c for (b, _), c in jumps.copied.items() if b == n - 1]
-            unknown += [v for (b, _), v in jumps.copy.items() if b == n - 1]
+            copies = [v for (b, _), v in jumps.copy.items() if b == n - 1]
         equations += [c for (_, m, _), c in self._block.sign_after.items() if m == n]
         pairs = [read(c) for index, c in self._block.cross.items() if index[1] == n]
         conditions = [read(c) for t in labels for c in self._conditions[t]]
-        return self._problem(equations, limits, pairs, conditions, labels, unknown)
+        return self._problem(equations, limits, pairs, conditions, labels, element.points, self._block.r[n], copies)
 
-    def _problem(self, equations, limits, pairs, conditions, labels, unknown):
+    def _problem(self, equations, limits, pairs, conditions, labels, points=(), length=None, copies=()):
         rows = [*(c.expr for c in equations), *limits]
         sides = [side for pair in pairs for side in pair]
         everything = variables_of([*rows, *sides])
-        timed = [v for v in everything if self._determined(v, labels)]
-        unknown = ComponentSet([*unknown, *timed])
+        unknown = ComponentSet([*([] if length is None else [length]), *copies])
+        unknown.update(v for v in everything if self._determined(v, labels))
         bounds = [(None, None) if self._is_state(v) else (v.lb, v.ub) for v in unknown]
         laid = [c.parent_component().local_name.endswith(DISCRETISATION) for c in equations]
         numbers = _numbers([*(row for row, is_laid in zip(rows, laid) if not is_laid), *limits, *sides], everything)
         kind = (len(rows), tuple(numbers), tuple(v in unknown for v in everything), tuple(bounds))
         known = [v for v in everything if v not in unknown]
-        return Equations(rows, pairs, conditions, list(unknown), timed, known, bounds, kind)
+        timed = [v for v in unknown if self._times.time(v) in points]
+        factors = ComponentMap((v, self._factor(v)) for v in unknown if self._factor(v) is not None)
+        return Equations(rows, pairs, conditions, length, list(unknown), timed, known, bounds, factors, kind)
 
     def _determined(self, v, labels):
         if self._times.time(v) not in labels or v in self._given:

@@ -19,6 +19,7 @@ from pyomo_fesd.errors import FesdError
 from pyomo_fesd.march.accumulation import accumulation
 from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
+from pyomo_fesd.march.freedom import refuse_freedom
 from pyomo_fesd.march.window import Window
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex, derivatives
@@ -93,7 +94,7 @@ class March:
             memory.set_weights(self._grid.elements[0])
         equations = self._reader.first(first)
         if equations.unknown:
-            window = Window(equations, self._options, steps=False)
+            window = Window(equations, self._options)
             self._require(window.solve(equations))
             window.put_out(equations)
 
@@ -153,6 +154,7 @@ class March:
         """Solve one element with a length of at most ``most``; returns its length."""
         equations = self._problem(element)
         if equations.kind not in self._windows:
+            refuse_freedom(equations)
             self._windows[equations.kind] = Window(equations, self._options), element.length
         window, nominal = self._windows[equations.kind]
         for options in TRIES[not warm :]:
