@@ -15,12 +15,12 @@ def state_jump(*sets, guard, reset):
 
     Parameters
     ----------
-    *sets
+    sets
         index sets, the ContinuousSet among them
-    guard : function (block, *index) -> expression
-        block is the parent, as in every Pyomo rule
-    reset : function (block, *index) -> list of (VarData, expression)
-        the states that jump with their values J after the jump, written with the values before it
+    guard : function -> expression
+        called as a rule: with the parent block and the index
+    reset : function -> list of (VarData, expression)
+        called likewise: the states that jump with their values J after the jump, written with the values before it
 
     Returns
     -------

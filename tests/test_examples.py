@@ -3,6 +3,7 @@
 import importlib
 
 import gas_liquid_tank
+import gearbox_car
 import numpy as np
 import oscillator
 import pyomo.environ as pyo
@@ -21,6 +22,10 @@ RADAU, LEGENDRE = 'LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE'
         ('toy_mpec', '21 certified'),
         ('gas_liquid_tank', '9.354868539 s'),
         ('oscillator', 'The circle is crossed at t = 1.000'),
+        ('thermostat', 'time 2.469743767: relay  heating -> cooling'),
+        ('bouncing_ball', 'q(3 s) = 0.5386263507 m'),
+        ('batch_reactor', 'Product: 106.495000 mol'),
+        ('gearbox_car', 'ten equal stages: T = 10.229257'),
     ],
 )
 def test_example_says_what_it_found_and_draws(name, said, tmp_path, monkeypatch, capsys):
@@ -88,3 +93,11 @@ def test_oscillator_shows_the_order_of_the_scheme(scheme, ncp, numbers, order):
     # how the elements are shared between the two sides of the switch differs from grid to grid: a fit over three
     errors = [oscillator.error(oscillator.solve(N, ncp, scheme)[0]) for N in numbers]
     assert -np.polyfit(np.log(numbers), np.log(errors), 1)[0] > order - 0.5
+
+
+def test_gearbox_car_reaches_the_optimum_of_continuous_time_where_the_stages_allow_it():
+    m, results = gearbox_car.solve(gearbox_car.BEST_STAGES)
+    assert results.solver.stationarity == 'B'
+    assert abs(m.T.value - gearbox_car.T_BEST) <= 1e-8
+    changes = [s.time / gearbox_car.HORIZON * m.T.value for s in pyomo_fesd.switches(m)]
+    assert changes == pytest.approx([3, 3 + 2 / 3 + 52 / 15 + 1], abs=1e-7)
