@@ -112,8 +112,7 @@ def thrown(start, nfe):
     return transform(m, nfe, 3)
 
 
-@pytest.mark.parametrize('start', [1.999, 1.95, 1.5])
-@pytest.mark.parametrize('nfe', [2, 3, 6])
+@pytest.mark.parametrize('start, nfe', [(1.999, 3), (1.999, 6), (1.95, 2), (1.95, 3), (1.5, 3)])
 def test_an_even_root_within_an_element_is_found_or_said(start, nfe):
     m = thrown(start, nfe)
     results = pyo.SolverFactory('mpec_hybrid').solve(m)
