@@ -196,6 +196,15 @@ def once_certified(act):
     return callback
 
 
+@pytest.fixture
+def ctrl_c():
+    """Ctrl-C as in a terminal: a shell starts background processes, such as a CI job, with it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures('ctrl_c')
 @pytest.mark.parametrize('interface', [pyo.SolverFactory, SolverFactoryV2])
 def test_ctrl_c_keeps_the_best_point(interface):
     m, best = small_mpccs.scholtes4()
