@@ -19,7 +19,7 @@ from pyomo_fesd.errors import FesdError
 from pyomo_fesd.march.accumulation import accumulation
 from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
-from pyomo_fesd.march.freedom import refuse_freedom
+from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
 from pyomo_fesd.march.window import Window
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex, derivatives
@@ -33,7 +33,12 @@ NO_STEP = 1e-9
 CUT = 1e-7
 #: How an element is tried, one after the other: from where the last one ended; from afar; with other starts.  A step of no
 #: length is a local solution of its own where a switch lies on the left boundary, so the later ones look farther.
-TRIES = ({'warm_start': True, 'lpec': 'reduced'}, {'lpec': 'full'}, {'lpec': 'full', 'starts': 6})
+TRIES = (
+    {'warm_start': True, 'lpec': 'reduced'},
+    {'lpec': 'full', 'relaxation': 'elastic'},
+    {'lpec': 'full'},
+    {'lpec': 'full', 'starts': 6},
+)
 
 
 class March:
@@ -83,16 +88,14 @@ class March:
         return len(elements) - 1 if short else len(self._events[stage])
 
     def _begin(self):
-        """The algebraic variables and the modes at the first time."""
+        """The algebraic variables, and states that they imply, and the modes at the first time."""
         first = self._wrt.first()
-        states = [d.get_state_var() for d in derivatives(self._model, self._wrt)]
-        free = next((v for x in states for v in x.values() if self._times.time(v) == first and not v.fixed), None)
-        if free is not None:
-            raise FesdError(free, "simulate: this state is not fixed at the first time", "fix its initial value")
         for memory in self._memories:
             memory.begin(first)
             memory.set_weights(self._grid.elements[0])
         equations = self._reader.first(first)
+        states = [d.get_state_var() for d in derivatives(self._model, self._wrt)]
+        refuse_free_start(equations, [v for x in states for v in x.values() if self._times.time(v) == first and not v.fixed])
         if equations.unknown:
             window = Window(equations, self._options)
             self._require(window.solve(equations))

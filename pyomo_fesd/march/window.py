@@ -17,8 +17,8 @@ from pyomo.mpec import Complementarity, complements
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.march.equations import variables_of
 
-#: Options of the small problems: a point that is not certified is judged by the march.
-OPTIONS = {'raise_exception_on_nonoptimal_result': False}
+#: Options of the small problems: a point that is not certified is judged by the march; a relaxation that takes long leads nowhere.
+OPTIONS = {'raise_exception_on_nonoptimal_result': False, 'relaxation_iterations': 100}
 
 
 class Window:

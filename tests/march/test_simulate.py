@@ -1,5 +1,7 @@
 """``simulate``: systems with exact answers, what is left of the model, and every refusal."""
 
+from math import exp
+
 import bouncing_ball
 import gas_liquid_tank
 import oscillator
@@ -520,8 +522,24 @@ def test_several_times():
 def test_a_state_that_is_not_fixed_at_the_first_time(name):
     m = move(bouncing_ball.build(), 10, 2)
     m.component(name)[0].unfix()
-    with pytest.raises(FesdError, match=rf'{name}\[0\]: simulate: this state is not fixed at the first time'):
+    with pytest.raises(FesdError, match=rf'{name}\[0\]: simulate: this state is neither fixed at the first time'):
         pyomo_fesd.simulate(m)
+
+
+@pytest.mark.parametrize('how', ['holdup', 'rate'])
+def test_a_state_that_equations_imply_at_the_first_time(how):
+    # V' = 2 - h with h = V/3: from h = 1, or from the rate 1
+    m = scalar_ode(end=2)
+    m.x[0].unfix()
+    m.h = pyo.Var(m.t, initialize=0.1)
+    m.balance = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == 2 - m.h[t])
+    m.cylinder = pyo.Constraint(m.t, rule=lambda m, t: 3 * m.h[t] == m.x[t])
+    m.rest = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == 0)
+    m.y[0].fix(0)
+    (m.h if how == 'holdup' else m.dx)[0].fix(1.0)
+    simulated(move(m, 4, 3))
+    assert m.x[0].value == pytest.approx(3.0) and not m.x[0].fixed
+    assert m.x[2].value == pytest.approx(6 - 3 * exp(-2 / 3), abs=1e-5)
 
 
 def test_a_control_that_is_not_named():
