@@ -17,7 +17,7 @@ from pyomo_fesd.elements.cross import grid_of
 from pyomo_fesd.elements.jumps import read_jumps
 from pyomo_fesd.elements.memory import read_modes
 from pyomo_fesd.records import records
-from pyomo_fesd.switching import public_name, size
+from pyomo_fesd.switching import size
 from pyomo_fesd.trajectory import jumps_that_happen, physical_time
 
 #: A function below this part of its largest value is zero all along an element.
@@ -58,7 +58,7 @@ def _kept(model, wrt, functions):
     for mode in read_modes(model, wrt):
         for k in range(min(map(len, mode.conditions.values()))):
             kept = {t: conditions[k] for t, conditions in mode.conditions.items()}
-            yield public_name(mode.name), kept, lambda element, zero, mode=mode: int(value(mode.weight(element)) > 0.5)
+            yield mode.title, kept, lambda element, zero, mode=mode: int(value(mode.weight(element)) > 0.5)
     for jump in read_jumps(model, wrt):
         yield jump.name, jump.guards, lambda element, zero: 1
 

@@ -1,4 +1,4 @@
-"""Modes with memory (hysteresis): a mode goes on until its own region ends, also where the region of another one has begun.
+"""Modes with memory (hysteresis): a mode goes on until its own region ends, also where that of another has begun (eq. E1, E2).
 
     nu_i in {0, 1} constant between switches,  sum_i nu_i = 1
     nu_i = 1  only where c_ik(x) >= 0 for all k           (the region of mode i, its inequalities)
@@ -8,8 +8,8 @@ The regions of the modes overlap; in the overlap the last mode decides.  Two mod
 hysteresis; a mode without a condition never ends, such as that of a disc that has burst.
 
 Takes: a ``MemorySystem``.
-Leaves: ``nu`` (of all modes but the last), ``weight`` of every mode and ``condition`` as Expressions, ``mode`` (eq. 7), and the
-mark MEMORY, from which ``fesd.finite_elements`` makes the law of switching between its elements (``elements/memory.py``).
+Leaves: ``nu`` of all modes but the last, ``weight`` of every mode and ``condition`` as Expressions, ``mode`` (eq. 7), and the mark
+MEMORY, from which ``fesd.finite_elements`` makes the law of switching between its elements (``elements/memory.py``).
 Does not apply: to a model on a fixed grid, where no element boundary can lie on the end of a region.
 """
 

@@ -25,7 +25,8 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
-from pyomo_fesd.timeindex import TimeIndex
+from pyomo_fesd.switching import public_name
+from pyomo_fesd.timeindex import TimeIndex, strip_time
 
 #: Sides of a boundary: a condition that jumps there stands on both, any other on the left only.
 LEFT, RIGHT = 0, 1
@@ -38,14 +39,16 @@ class Mode:
     Attributes
     ----------
     name : str
-    system : str
-        the Disjunction that it belongs to, by the family name of its weights
+        the family name of its weights
+    system, title : str
+        the Disjunction that it belongs to, and with it the disjunct, as people know them
     weights : dict label -> ExpressionData
     conditions : dict label -> tuple of expressions c >= 0
     """
 
     name: str
     system: str
+    title: str
     weights: dict
     conditions: dict
 
@@ -67,6 +70,7 @@ class Mode:
 def read_modes(model, wrt):
     """The modes with memory over ``wrt``, from the marks, also after they are used up."""
     times, marked = TimeIndex(wrt), {}
+    disjuncts = {id(weight): disjunct for disjunct, weight in marks.marked(model, marks.INDICATOR)}
     for weight, conditions in marks.marked(model, marks.MEMORY, used=True):
         label, name = times.split(weight)
         if label is not None:
@@ -74,12 +78,21 @@ def read_modes(model, wrt):
     return [
         Mode(
             name,
-            re.sub(r',?\d+\]$', ']', name),
+            *_titles(name, family, disjuncts, times),
             {t: weight for t, (weight, _) in family.items()},
             {t: tuple(c.expr for c in conditions) for t, (_, conditions) in family.items()},
         )
         for name, family in marked.items()
     ]
+
+
+def _titles(name, family, disjuncts, times):
+    """Names for people: ``relay`` and ``relay: heating``; ``relay: mode 1`` where the disjunct has no name of its own."""
+    *units, number = (i for i in re.search(r'\[([^[]*)\]$', name)[1].split(',') if i != '*')
+    system = re.sub(r'_memory_\d+$', '', public_name(name)) + (f"[{','.join(units)}]" if units else '')
+    disjunct = disjuncts.get(id(next(weight for weight, _ in family.values())))
+    own = None if disjunct is None else strip_time(times.split(disjunct)[1]).split('.')[-1]
+    return system, f'{system}: {own}' if own and '_disjuncts' not in own else f'{system}: mode {number}'
 
 
 def add_memory(block, modes, limits, grid, wrt):

@@ -6,11 +6,13 @@ Each function ``_remember_...`` notes one thing about the model and returns the 
 from contextlib import ExitStack, contextmanager
 
 from pyomo.common.collections import ComponentMap
-from pyomo.core import Block, Expression, Param, Suffix, Var
+from pyomo.core import Block, Constraint, Expression, Param, Suffix, Var
 from pyomo.dae import DerivativeVar, Integral
 from pyomo.gdp import Disjunct
 
+from pyomo_fesd import marks
 from pyomo_fesd.records import records
+from pyomo_fesd.timeindex import DISCRETISATION
 
 PLACES = (Block, Disjunct)
 
@@ -32,6 +34,8 @@ def restored_on_error(block, wrt):
         undo.callback(_remember_values(model))
         undo.callback(_remember_components(model))
         undo.callback(_remember_suffixes(model))
+        undo.callback(_remember_weights(model))
+        undo.callback(_remember_discretisation(model))
         yield
         undo.pop_all()
 
@@ -60,6 +64,29 @@ def _remember_values(model):
                 v.stale, v.fixed = stale, fixed
         for p, value in params:
             p._value = value
+
+    return restore
+
+
+def _remember_weights(model):
+    """Modes with memory: the weights of an element get one variable, whose value is remembered with all others."""
+    weights = [(w, w.expr) for w, _ in marks.marked(model, marks.MEMORY)]
+
+    def restore():
+        for weight, expr in weights:
+            weight.set_value(expr)
+
+    return restore
+
+
+def _remember_discretisation(model):
+    """Equations of a grid that was there before get lengths and values after jumps."""
+    constraints = model.component_objects(Constraint, descend_into=Block)
+    equations = [(e, e.expr) for c in constraints if c.local_name.endswith(DISCRETISATION) for e in c.values()]
+
+    def restore():
+        for equation, expr in equations:
+            equation.set_value(expr)
 
     return restore
 

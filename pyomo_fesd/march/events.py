@@ -99,9 +99,9 @@ class Memory:
         inside = [m for m, space in room if space > 0]
         possible = inside or [m for m, space in room if space >= 0]
         if len(possible) != 1:
-            names = ', '.join(m.name for m in possible) or 'none'
+            names = ', '.join(m.title for m in possible) or 'none'
             raise FesdError(
-                self._active.name,
+                self._active.title,
                 f"simulate: {len(possible)} modes can follow where this one ends ({names})",
                 "state the regions so that where a mode ends the point lies in one other region",
             )

@@ -71,6 +71,8 @@ class HybridSolver:
         """The whole algorithm."""
         if not (self._options.warm_start and self._from_values()):
             self._path(self._c.x0, self._branches).follow()
+            if self._start_is_better():
+                self._branches.explore_from(self._c.x0, False)
             if self.run.point is not None and self._c.has_objective:
                 self._branches.move()
         if self.run.point is None:
@@ -91,7 +93,7 @@ class HybridSolver:
             # a limit, too, leaves the last relaxation
             end = path.end
             if end is not None:
-                self.run.point = Point(end, self._c.evaluate(end.w).f, self._steps.measure(end))
+                self.run.point = Point(end, self._c.evaluate(end.w).f, self._steps.measure(end.w))
         if end is not None and (path.finished or self.run.point.certificate.feasible):
             return Outcome.RELAXED
         self.run.point = None
@@ -105,6 +107,13 @@ class HybridSolver:
         self._steps.keep_least_infeasible(self._c.x0)
         self._branches.explore_from(self._c.x0, False)
         return self.run.point is not None and self.run.point.certificate.certified
+
+    def _start_is_better(self):
+        """Whether the path led to nothing certified, or to nothing as good as a start that is feasible, say from a simulation."""
+        point, start = self.run.point, self._c.x0
+        if point is None or not point.certificate.certified:
+            return True
+        return point.f > self._c.evaluate(start).f and self._steps.measure(start).feasible
 
     def _last_resort(self):
         """Nothing feasible on the path: the branches are searched, where they are few also from other starts.

@@ -101,9 +101,9 @@ class Steps:
         self._log('certificate', 0.0, nlp.w, 0, certificate.grade.name, started)
         return certificate
 
-    def measure(self, relaxed):
-        """The residuals of a relaxation's solution."""
-        return measure(self._c, relaxed.w, self._tolerances)
+    def measure(self, w):
+        """The residuals of a relaxation's solution, or of the start."""
+        return measure(self._c, w, self._tolerances)
 
     def keep_least_infeasible(self, w):
         """Remember the point to report if nothing feasible is found."""

@@ -3,7 +3,7 @@
 import pyomo.environ as pyo
 import pytest
 import thermostat
-from pyomo.gdp import Disjunction
+from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
 import pyomo_fesd
@@ -236,6 +236,27 @@ def test_disjuncts_that_define_different_variables_are_refused():
     m = scalar_ode()
     m.d = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 1, m.dx[t] == 1], [m.x[t] >= 0, m.dy[t] == -1]])
     with pytest.raises(FesdError, match='does not define'):
+        remembered(m, 'd')
+
+
+@pytest.mark.parametrize('what, cause', [('nested', 'contains another Disjunct'), ('logic', 'contains a LogicalConstraint')])
+def test_what_a_disjunct_over_time_cannot_contain_is_refused(what, cause):
+    m = thermostat.build()
+    d = m.heating[0]
+    if what == 'nested':
+        d.inner = Disjunct()
+    else:
+        d.inner = pyo.LogicalConstraint(expr=d.indicator_var.implies(m.cooling[0].indicator_var))
+    before = snapshot(m)
+    with pytest.raises(FesdError, match=cause):
+        remembered(m, 'relay')
+    assert snapshot(m) == before
+
+
+def test_several_modes_at_once_are_refused():
+    m = scalar_ode()
+    m.d = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 1, m.dx[t] == 1], [m.x[t] >= 0, m.dx[t] == -1]], xor=False)
+    with pytest.raises(FesdError, match='declared with xor=False'):
         remembered(m, 'd')
 
 

@@ -13,8 +13,8 @@ from pyomo_fesd import FesdError, marks
 from pyomo_fesd.complementarity import read
 from pyomo_fesd.elements.cross import grid_of
 from pyomo_fesd.elements.memory import LEFT, read_modes
-from tests.models import collocate, dcs, finite_elements, snapshot
-from tests.problems import burst_disc, gears, refilled, setpoints, thermostats
+from tests.models import collocate, dcs, finite_elements, scalar_ode, snapshot
+from tests.problems import burst_disc, gears, refilled, setpoints, thermostats, two_tanks
 from tests.problems.running import LEGENDRE, RADAU, SCHEMES, lengths, move, seen
 
 HEATING = '_pyomo_fesd_dcs.relay_memory_2.weight[*,1]'
@@ -101,6 +101,24 @@ def test_more_than_two_modes_exclude_one_another():
     moved(m, [m.gear], 4, 1)
     law = on_grid(m)
     assert len(law.one) == 4 and len(law.binary) == 8
+
+
+def test_modes_are_called_as_the_user_calls_them():
+    def titles(m, *memory):
+        dcs(m, memory=list(memory))
+        return [(mode.system, mode.title) for mode in read_modes(m, m.t)]
+
+    m = gears.build()
+    assert titles(m, m.gear) == [('gear', f'gear: {name}') for name in ('first', 'second', 'third')]
+    m = thermostats.build(time_first=True)
+    assert ('relay[b]', 'relay[b]: cooling[b]') in titles(m, m.relay)
+    m = thermostats.build_in_blocks()
+    assert titles(m, m) == [('hyb.relay', 'hyb.relay: heating'), ('hyb.relay', 'hyb.relay: cooling')]
+    m = two_tanks.build()
+    assert titles(m, m.hose) == [('hose', 'hose: fill[1]'), ('hose', 'hose: fill[2]')]
+    m = scalar_ode()
+    m.d = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 1, m.dx[t] == 1], [m.x[t] >= 0, m.dx[t] == -1]])
+    assert titles(m, m.d) == [('d', 'd: mode 1'), ('d', 'd: mode 2')]
 
 
 # Whole paths
