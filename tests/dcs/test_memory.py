@@ -239,7 +239,7 @@ def test_disjuncts_that_define_different_variables_are_refused():
         remembered(m, 'd')
 
 
-@pytest.mark.parametrize('what, cause', [('nested', 'contains another Disjunct'), ('logic', 'contains a LogicalConstraint')])
+@pytest.mark.parametrize('what, cause', [('nested', 'contains the Disjunct'), ('logic', 'contains a LogicalConstraint')])
 def test_what_a_disjunct_over_time_cannot_contain_is_refused(what, cause):
     m = thermostat.build()
     d = m.heating[0]
