@@ -5,6 +5,7 @@ Importing this registers ``fesd.dcs``, ``fesd.smooth_to_complementarity``, ``fes
 
 import pyomo.environ  # noqa: F401  registers Pyomo's own plug-ins first
 
+from pyomo_fesd import units
 from pyomo_fesd.clock import clock
 from pyomo_fesd.dcs import transformation as _dcs  # noqa: F401
 from pyomo_fesd.elements import transformation as _elements  # noqa: F401
@@ -38,4 +39,5 @@ __all__ = [
     'state_jump',
     'switches',
     'trajectory',
+    'units',
 ]

@@ -8,7 +8,7 @@ import pytest
 import pyomo_fesd
 
 PACKAGE = Path(pyomo_fesd.__file__).parent
-ROOMS = ('dcs', 'elements', 'kinks', 'mpcc')
+ROOMS = ('dcs', 'elements', 'kinks', 'mpcc', 'units')
 
 
 def imports(path):
@@ -58,4 +58,5 @@ def test_public_names():
         'state_jump',
         'switches',
         'trajectory',
+        'units',
     ]
