@@ -86,6 +86,8 @@ def use_up(block, name, wrt):
 def is_generated(component):
     """Whether ``component`` is, or lies in, a block that one of the transformations made."""
     while component is not None:
+        # a name with an index takes time to write
+        component = component.parent_component()
         if component.local_name.startswith(GENERATED):
             return True
         component = component.parent_block()
