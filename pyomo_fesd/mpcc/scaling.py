@@ -30,7 +30,8 @@ class UserFactors:
 
     def __init__(self, model, wanted):
         present = any(s.local_name == 'scaling_factor' for s in model.component_objects(Suffix, active=True))
-        self._find = SuffixFinder('scaling_factor', 1.0, model).find if wanted and present else None
+        # without a context also those of components on a temporary block are found
+        self._find = SuffixFinder('scaling_factor', 1.0).find if wanted and present else None
 
     def of(self, components):
         """Factors of ``components``, as an array."""
