@@ -19,6 +19,7 @@ from pyomo_fesd.projected import projection
 from pyomo_fesd.report import report
 from pyomo_fesd.solver import certify
 from pyomo_fesd.state_jump import state_jump
+from pyomo_fesd.structure import structure
 from pyomo_fesd.trajectory import element_lengths, physical_time, switches, trajectory
 
 __version__ = '0.1.0'
@@ -38,6 +39,7 @@ __all__ = [
     'report',
     'simulate',
     'state_jump',
+    'structure',
     'switches',
     'trajectory',
 ]

@@ -33,6 +33,7 @@ from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.mpcc.problem import read_problem
 from pyomo_fesd.mpcc.results import Loader
 from pyomo_fesd.mpcc.source import Contradiction
+from pyomo_fesd.structure import structure
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -130,7 +131,10 @@ class CasadiIpopt(SolverBase):
                 answer, results.solver_log = _run(compiled, options, config.tee, deadline)
             _conclude(results, answer.status, answer.status.replace('_', ' '), answer.iterations)
             results.solution_loader = Loader(model, compiled, answer.w, answer)
-            if results.solution_status is SolutionStatus.optimal and compiled.has_objective:
+            if results.solution_status is not SolutionStatus.optimal:
+                info = results.extra_info
+                info.solver_message = '; '.join(part for part in (info.solver_message, structure(model).problem) if part)
+            elif compiled.has_objective:
                 results.incumbent_objective = compiled.objective(answer.f)
         results.timing_info.wall_time = time.perf_counter() - started
         return _deliver(results, config)

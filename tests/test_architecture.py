@@ -56,6 +56,7 @@ def test_public_names():
         'report',
         'simulate',
         'state_jump',
+        'structure',
         'switches',
         'trajectory',
     ]

@@ -127,9 +127,7 @@ def _refuse(model, solver):
             raise FesdError(found, f"an active {ctype.__name__}, which {solver} does not handle", fix)
     for v in model.component_data_objects(Var, active=True, descend_into=Block):
         if not v.fixed and not v.is_continuous():
-            raise FesdError(
-                v, "an integer variable", f"fix it, or relax its domain: {solver} does not decide integers"
-            )
+            raise FesdError(v, "an integer variable", f"fix it, or relax its domain: {solver} does not decide integers")
 
     for name, what in UNDONE.items():
         found = next(marks.marked(model, name), None)
