@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from pyomo.common.collections import ComponentMap
 from pyomo.common.modeling import unique_component_name
-from pyomo.core import Block, ConstraintList, Objective, Suffix, VarList, quicksum, value
+from pyomo.core import Block, ConstraintList, Objective, VarList, quicksum, value
 from pyomo.repn import generate_standard_repn
 
 from pyomo_fesd.mpcc.problem import Condition
@@ -45,16 +45,14 @@ class Entries:
 
 @contextmanager
 def entries_of(problem, handles):
-    """The ``Entries`` of ``problem`` on a scratch block; its pairs and the exported suffixes sleep while it exists."""
+    """The ``Entries`` of ``problem`` on a scratch block; its pairs sleep while it exists."""
     model, scratch = problem.model, Block()
     model.add_component(unique_component_name(model, '_pyomo_fesd_scratch'), scratch)
-    pairs, suffixes = _sleep(problem.sources), _sleep_suffixes(model)
+    pairs = _sleep(problem.sources)
     try:
         yield _entries(scratch, problem, handles)
     finally:
         model.del_component(scratch)
-        for suffix in suffixes:
-            suffix.activate()
         _wake(pairs)
 
 
@@ -131,11 +129,3 @@ def _wake(components):
         component._active = True
         for data in datas:
             data.activate()
-
-
-def _sleep_suffixes(model):
-    """Deactivate the suffixes that the NL writer would export; returns them."""
-    suffixes = [s for s in model.component_objects(Suffix, active=True, descend_into=Block) if s.export_enabled()]
-    for suffix in suffixes:
-        suffix.deactivate()
-    return suffixes
