@@ -14,7 +14,6 @@ from math import pi
 import numpy as np
 import pyomo.dae as dae
 import pyomo.environ as pyo
-from pyomo.gdp import Disjunction
 
 import pyomo_fesd  # noqa: F401
 

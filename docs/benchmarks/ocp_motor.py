@@ -10,7 +10,6 @@ Units: m, s, N, A, V.  Source: Christiansen, Maurer, Zirn (2008); problem 'motor
 import numpy as np
 import pyomo.dae as dae
 import pyomo.environ as pyo
-from pyomo.gdp import Disjunction
 
 import pyomo_fesd  # noqa: F401
 
