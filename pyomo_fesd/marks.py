@@ -6,7 +6,7 @@ A mark is a ``Suffix(direction=LOCAL)`` with one of the names below on the block
 =================  ========================  ===========================================================================
 mark               on                        value
 =================  ========================  ===========================================================================
-CONTINUOUS         Var                       the Constraint (of lam, mu, p, n), Complementarity (of a kink's s) or Expression (the
+CONTINUOUS         Var (or data)             the Constraint (of lam, mu, p, n), Complementarity (of a kink's s) or Expression (the
                                              arguments of the weights w) that ties it to the states: continuous in time where
                                              the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
