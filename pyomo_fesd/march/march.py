@@ -52,7 +52,7 @@ class March:
         systems = dict.fromkeys(m.system for m in modes)
         self._memories = [Memory([m for m in modes if m.system == s], self._block.component('memory')) for s in systems]
         self._jumps = Jumps(jumps, self._block.component('jumps'))
-        self._reader = Reader(model, self._block, self._times, self._given(inputs))
+        self._reader = Reader(model, self._block, self._grid, self._times, self._given(inputs))
         self._equations, self._windows = {}, {}
         self._time, self._events = float(wrt.first()), {}
 
@@ -176,8 +176,8 @@ class March:
 
     def _problem(self, element):
         if element.n not in self._equations:
-            limits = [row for memory in self._memories for row in memory.limits(element)]
-            self._equations[element.n] = self._reader.element(element, [*limits, *self._jumps.limits(element)])
+            limits = {name: rows for law in (*self._memories, self._jumps) for name, rows in law.limits(element).items()}
+            self._equations[element.n] = self._reader.element(element, limits)
         return self._equations[element.n]
 
     def _warn_short(self):
