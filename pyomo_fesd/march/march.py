@@ -9,6 +9,7 @@ Does not apply: to systems with freedom; inputs have to be given.
 """
 
 import logging
+from dataclasses import replace
 
 from pyomo.common.collections import ComponentSet
 
@@ -20,7 +21,9 @@ from pyomo_fesd.march.accumulation import accumulation
 from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
+from pyomo_fesd.march.kind import Kind, State, active_at_first
 from pyomo_fesd.march.window import Window
+from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex, derivatives
 from pyomo_fesd.trajectory import physical_time
@@ -44,8 +47,8 @@ TRIES = (
 class March:
     """One march over one moving grid."""
 
-    def __init__(self, model, wrt, inputs, options):
-        self._model, self._wrt, self._options = model, wrt, options
+    def __init__(self, model, wrt, inputs, options, timer):
+        self._model, self._wrt, self._options, self._timer = model, wrt, options, timer
         self._block, self._times = records(model).grids[wrt], TimeIndex(wrt)
         self._grid = grid_of(self._block)
         modes, jumps = read_modes(model, wrt), read_jumps(model, wrt)
@@ -53,7 +56,7 @@ class March:
         self._memories = [Memory([m for m in modes if m.system == s], self._block.component('memory')) for s in systems]
         self._jumps = Jumps(jumps, self._block.component('jumps'))
         self._reader = Reader(model, self._block, self._grid, self._times, self._given(inputs))
-        self._equations, self._windows = {}, {}
+        self._equations, self._kinds, self._state = {}, {}, State()
         self._time, self._events = float(wrt.first()), {}
 
     def _given(self, inputs):
@@ -97,8 +100,10 @@ class March:
         states = [d.get_state_var() for d in derivatives(self._model, self._wrt)]
         refuse_free_start(equations, [v for x in states for v in x.values() if self._times.time(v) == first and not v.fixed])
         if equations.unknown:
-            window = Window(equations, self._options)
-            self._require(window.solve(equations))
+            with phase(self._timer, 'compile'):
+                window = Window(equations, self._options)
+            with phase(self._timer, 'window'):
+                self._require(window.solve(equations))
             window.put_out(equations)
 
     def _through(self, reserve):
@@ -112,9 +117,10 @@ class March:
         self._jumps.begin()
         for memory in self._memories:
             memory.begin(self._wrt.first())
-        warm = False
+        warm, self._state = False, State(active_at_first(self._reader.sides(self._wrt.first())))
         for stage, elements in self._grid.stages.items():
             rest = sum(e.length for e in elements)
+            self._state = replace(self._state, left=None)
             for number, element in enumerate(elements):
                 left, expected = len(elements) - number, max(0, reserve[stage] - len(self._events[stage]))
                 share = rest / max(1, left - expected)
@@ -135,7 +141,7 @@ class March:
         """One element of at most the length ``share``; returns its length and what happens at its end."""
         for memory in self._memories:
             memory.set_weights(element)
-        h, last = self._step(element, share, warm), len(own_labels(element))
+        (h, state), last = self._step(element, share, warm), len(own_labels(element))
         while True:
             arrived = [(memory, memory.arrived(element)) for memory in self._memories]
             jumped = self._jumps.arrived(element)
@@ -143,7 +149,8 @@ class March:
             if min(places, default=last) == last:
                 break
             # a stage point is there already: the element ends where that point was
-            h = self._step(element, h * self._grid.tau[min(places) - 1], True)
+            h, state = self._step(element, h * self._grid.tau[min(places) - 1], True)
+        self._state = state
         if element is self._grid.elements[-1]:
             return h, []
         happened = self._jumps.end(element, jumped)
@@ -151,23 +158,33 @@ class March:
             if last in found or memory.ends_beyond(element.n, element.right):
                 memory.end(element.n, element.right)
                 happened.append(memory.name)
+        if happened:
+            self._state = replace(state, left=None)
         return h, happened
 
     def _step(self, element, most, warm):
-        """Solve one element with a length of at most ``most``; returns its length."""
+        """Solve one element with a length of at most ``most``; returns its length and the state at its end."""
         equations = self._problem(element)
-        if equations.kind not in self._windows:
+        if equations.kind not in self._kinds:
             refuse_freedom(equations)
-            self._windows[equations.kind] = Window(equations, self._options), element.length
-        window, nominal = self._windows[equations.kind]
+            self._kinds[equations.kind] = Kind(equations, element, self._grid, self._options, self._timer)
+        kind = self._kinds[equations.kind]
+        found = kind.smooth_step(equations, self._state, most, lambda: self._values_before(equations, element))
+        h, state = self._by_window(kind, equations, most, warm) if found is None else found
+        h = most if h > most * (1 - CUT) else h
+        self._block.r[element.n].set_value(h / element.length, skip_validation=True)
+        return h, state
+
+    def _values_before(self, equations, element):
+        """Values of the unknowns of an element as they are on its left."""
+        return [_value_at(self._times, v, element.left) if self._times.time(v) is not None else v.value for v in equations.unknown]
+
+    def _by_window(self, kind, equations, most, warm):
+        """Where the next active set is not known, or does not hold."""
         for options in TRIES[not warm :]:
-            answer = window.solve(equations, most / nominal, **options)
-            h = window.length * nominal
+            answer, h = kind.window_step(equations, most, options)
             if answer.stationarity == 'B' and h > NO_STEP * most:
-                h = most if h > most * (1 - CUT) else h
-                window.put_out(equations)
-                self._block.r[element.n].set_value(h / element.length, skip_validation=True)
-                return h
+                return kind.take_window(equations, most, h)
         self._require(answer)
         raise self._stuck(
             f"no step is possible from time {self._time:.6g}",
@@ -220,3 +237,12 @@ class March:
             f"the elements of control stage {stage} are used up at time {self._time:.6g}, after {number} switches",
             "take more elements (nfe)",
         )
+
+
+def _value_at(times, v, label):
+    """Value of the counterpart of a variable at another time, or its own where there is none."""
+    try:
+        found = times.at(v, label).value
+    except KeyError:
+        found = None
+    return v.value if found is None else found

@@ -87,3 +87,10 @@ def known_values(equations):
     if None in found:
         raise FesdError(equations.known[found.index(None)], "simulate: it has no value", "give it one")
     return found
+
+
+def put_out(equations, values):
+    """Write ``values`` of the unknowns of ``equations`` into the user's model; a length is the caller's business."""
+    for v, number in zip(equations.unknown, values):
+        if v is not equations.length:
+            v.set_value(number, skip_validation=True)

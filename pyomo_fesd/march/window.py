@@ -12,7 +12,7 @@ import pyomo.environ as pyo
 from pyomo.contrib.solver.common.factory import SolverFactory
 from pyomo.contrib.solver.common.results import TerminationCondition
 
-from pyomo_fesd.march.scene import Scene
+from pyomo_fesd.march.scene import Scene, put_out
 
 #: Options of the small problems: a point that is not certified is judged by the march; a relaxation that takes long leads nowhere.
 OPTIONS = {'raise_exception_on_nonoptimal_result': False, 'relaxation_iterations': 100}
@@ -66,12 +66,6 @@ class Window:
         return [v.value for v in self.model.unknown.values()]
 
     def put_out(self, equations):
-        """Write what was found into the user's model; a length is the caller's business."""
+        """Write what was found into the user's model."""
         put_out(equations, self.values)
 
-
-def put_out(equations, values):
-    """Write ``values`` of the unknowns of ``equations`` into the user's model, except the length."""
-    for v, number in zip(equations.unknown, values):
-        if v is not equations.length:
-            v.set_value(number, skip_validation=True)
