@@ -22,6 +22,7 @@ from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
 from pyomo_fesd.march.kind import Kind, State, active_at_first
+from pyomo_fesd.march.shares import Even, equal_lengths, wanted
 from pyomo_fesd.march.window import Window
 from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.records import records
@@ -34,6 +35,8 @@ logger = logging.getLogger('pyomo_fesd')
 NO_STEP = 1e-9
 #: A step that is shorter than its share by more than this part has been cut short by an event.
 CUT = 1e-7
+#: Lengths between two switches are equal if they differ by less than this part; what is left after so many marches may be larger.
+EQUAL, NEARLY, PASSES = 1e-11, 1e-7, 6
 #: How an element is tried, one after the other: from where the last one ended; from afar; with other starts.  A step of no
 #: length is a local solution of its own where a switch lies on the left boundary, so the later ones look farther.
 TRIES = (
@@ -72,17 +75,42 @@ class March:
         return given
 
     def run(self):
-        """March through all elements; where their number does not fit the switches of a stage, again with one for each of them."""
-        self._begin()
+        """March through all elements, and again with equal lengths between the switches that were found."""
+        with phase(self._timer, 'begin'):
+            self._begin()
+        shares = self._enough_elements()
+        if wanted(self._block) and not self._equalise():
+            self._through(shares)
+        self._warn_short()
+
+    def _enough_elements(self):
+        """Where their number does not fit the switches of a stage, march again with one for each of them; returns the shares."""
         reserve, tried = dict.fromkeys(self._grid.stages, 0), set()
         while True:
-            stage = self._through(reserve)
+            shares = Even(dict(reserve))
+            stage = self._through(shares)
             if stage is None:
-                return self._warn_short()
+                return shares
             reserve[stage] = self._expected(stage)
             if tuple(reserve.values()) in tried:
                 raise self._used_up(stage)
             tried.add(tuple(reserve.values()))
+
+    def _equalise(self):
+        """March with equal lengths between switches until they fit; returns whether they do."""
+        equal, differs = equal_lengths(self._block, self._grid)
+        for _ in range(PASSES):
+            if differs <= EQUAL:
+                return True
+            try:
+                if self._through(equal) is not None:
+                    return False
+            except FesdError:
+                return False
+            before, (equal, differs) = equal, equal_lengths(self._block, self._grid)
+            if equal.last != before.last:
+                return False
+        return differs <= NEARLY
 
     def _expected(self, stage):
         """The switches to expect in a stage whose elements did not fit; all of them are for switches if these accumulate there."""
@@ -106,24 +134,25 @@ class March:
                 self._require(window.solve(equations))
             window.put_out(equations)
 
-    def _through(self, reserve):
+    def _through(self, shares):
         """March once; returns the stage whose elements do not fit, None if all went well.
 
         Parameters
         ----------
-        reserve : dict stage -> number of switches to be expected
+        shares : Even or Equal
+            how long the elements are to be
         """
-        self._time, self._events = float(self._wrt.first()), {stage: [] for stage in reserve}
+        first = self._wrt.first()
+        self._time, self._events = float(first), {stage: [] for stage in self._grid.stages}
         self._jumps.begin()
         for memory in self._memories:
-            memory.begin(self._wrt.first())
-        warm, self._state = False, State(active_at_first(self._reader.sides(self._wrt.first())))
+            memory.begin(first)
+        warm, self._state = False, State(active_at_first(self._reader.sides(first)))
         for stage, elements in self._grid.stages.items():
             rest = sum(e.length for e in elements)
             self._state = replace(self._state, left=None)
-            for number, element in enumerate(elements):
-                left, expected = len(elements) - number, max(0, reserve[stage] - len(self._events[stage]))
-                share = rest / max(1, left - expected)
+            for left, element in zip(range(len(elements), 0, -1), elements):
+                share = shares.most(element, rest, left, len(self._events[stage]))
                 h, happened = self._advance(element, share, warm)
                 cut = h < share * (1 - CUT)
                 # after a switch another active set holds
@@ -134,7 +163,7 @@ class March:
                 if (rest <= CUT * share) != (left == 1):
                     return stage
         for memory in self._memories:
-            memory.settle(self._grid, self._wrt.first())
+            memory.settle(self._grid, first)
         return None
 
     def _advance(self, element, share, warm):
