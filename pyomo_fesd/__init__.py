@@ -7,6 +7,7 @@ Importing this registers ``fesd.dcs``, ``fesd.smooth_to_complementarity``, ``fes
 import pyomo.environ  # noqa: F401  registers Pyomo's own plug-ins first
 
 from pyomo_fesd import casadi_ipopt as _casadi_ipopt  # noqa: F401
+from pyomo_fesd import units
 from pyomo_fesd.clock import clock
 from pyomo_fesd.dcs import transformation as _dcs  # noqa: F401
 from pyomo_fesd.elements import transformation as _elements  # noqa: F401
@@ -42,4 +43,5 @@ __all__ = [
     'structure',
     'switches',
     'trajectory',
+    'units',
 ]

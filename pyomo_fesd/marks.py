@@ -6,7 +6,7 @@ A mark is a ``Suffix(direction=LOCAL)`` with one of the names below on the block
 =================  ========================  ===========================================================================
 mark               on                        value
 =================  ========================  ===========================================================================
-CONTINUOUS         Var                       the Constraint (of lam, mu, p, n), Complementarity (of a kink's s) or Expression (the
+CONTINUOUS         Var (or data)             the Constraint (of lam, mu, p, n), Complementarity (of a kink's s) or Expression (the
                                              arguments of the weights w) that ties it to the states: continuous in time where
                                              the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
@@ -86,6 +86,8 @@ def use_up(block, name, wrt):
 def is_generated(component):
     """Whether ``component`` is, or lies in, a block that one of the transformations made."""
     while component is not None:
+        # a name with an index takes time to write
+        component = component.parent_component()
         if component.local_name.startswith(GENERATED):
             return True
         component = component.parent_block()

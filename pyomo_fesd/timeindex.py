@@ -3,7 +3,7 @@
 from collections import defaultdict
 
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, Constraint
+from pyomo.core import Block, Constraint, Var
 from pyomo.core.base.block import BlockData
 from pyomo.dae import ContinuousSet, DerivativeVar
 from pyomo.gdp import Disjunct
@@ -171,7 +171,7 @@ def find_continuous_set(block, wrt, caller):
 
 def derivatives(block, wrt):
     """Every DerivativeVar with respect to ``wrt`` below ``block``, also after discretisation made it a plain Var."""
-    for var in block.component_objects(descend_into=(Block, Disjunct)):
+    for var in block.component_objects((Var, DerivativeVar), descend_into=(Block, Disjunct)):
         if isinstance(var, DerivativeVar) and any(s is wrt for s in var.get_continuousset_list()):
             yield var
 

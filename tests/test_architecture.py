@@ -8,7 +8,7 @@ import pytest
 import pyomo_fesd
 
 PACKAGE = Path(pyomo_fesd.__file__).parent
-ROOMS = ('dcs', 'elements', 'kinks', 'mpcc')
+ROOMS = ('dcs', 'elements', 'kinks', 'mpcc', 'units')
 
 
 def imports(path):
@@ -59,4 +59,5 @@ def test_public_names():
         'structure',
         'switches',
         'trajectory',
+        'units',
     ]

@@ -1,6 +1,7 @@
 """``fesd.finite_elements``: collocation on elements whose boundaries find the switches."""
 
 from pyomo.common.config import ConfigDict, ConfigValue, In, NonNegativeFloat, PositiveInt, document_class_CONFIG
+from pyomo.common.gc_manager import PauseGC
 from pyomo.common.modeling import unique_component_name
 from pyomo.core import Block, Transformation, TransformationFactory
 from pyomo.gdp import Disjunction
@@ -173,7 +174,7 @@ class FiniteElements(Transformation):
         config.set_value(kwds)
         wrt = find_continuous_set(instance, config.wrt, 'fesd.finite_elements')
         self._check(instance, wrt, config)
-        with restored_on_error(instance, wrt):
+        with restored_on_error(instance, wrt), PauseGC():
             stages, times = self._discretise(instance, wrt, config), TimeIndex(wrt)
             grid = read_grid(wrt, stages)
             fix_given(config.piecewise_constant, grid, wrt)
