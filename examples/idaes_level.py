@@ -3,9 +3,9 @@
     mv = mid(0, mv_ref + K e + I, mv_ub),     dI/dt = K_i e + K_b (mv - (mv_ref + K e + I)),     e = setpoint - volume
 
 IDAES' PIDController bounds its output by ``smooth_bound``, which is off by up to eps/2 at a limit, with a default eps = 1e-4 in
-whatever unit the output has: a fortieth of what this valve can pass.  One call, ``fesd.smooth_to_complementarity``, replaces it by two
-complementarity pairs; no parameter is left.  Begun far above the set point the valve is open, follows the controller, is closed
-for a while, and follows again; element boundaries find the three times.
+whatever unit the output has: a fortieth of what this valve can pass.  One call, ``fesd.smooth_to_complementarity``, replaces it
+by two complementarity pairs; no parameter is left.  Begun far above the set point the valve is open, follows the controller, is
+closed for a while, and follows again; element boundaries find the three times.
 
 The density is constant, so the level does not depend on the reaction: scipy solves it apart, with events, as a reference.
 """
@@ -62,7 +62,7 @@ def exact(m):
 def exact_by_hand(m):
     """The same, smaller: one variable and no equation where the controller has its bound."""
     pid = m.fs.pid
-    pid.mv_eqn.deactivate()
+    pid.del_component(pid.mv_eqn)  # pyomo.dae makes new times of a deactivated one active
     m.fs.valve = saturation(m.fs.time, command=pid.mv_unbounded, output=m.fs.cstr.outlet.flow_vol, low=0, high=OPEN)
     return m
 

@@ -2,7 +2,7 @@
 
     s_x = 1/max(|x|, least),     s_g = 1/max_j |dg/dx_j|/s_x_j                at the present values
 
-A flowsheet in SI units has enthalpies of 1e9 J beside flows of 1e-3 m3/s; without scaling residuals are judged by the wrong measure.
+A flowsheet in SI units has enthalpies of 1e9 J beside flows of 1e-3 m3/s; without scaling its residuals mean nothing.
 
 Takes: a block whose variables have sensible values.
 Leaves: ``scaling_factor`` Suffixes, as IDAES keeps them, where a variable or constraint has no factor yet.
