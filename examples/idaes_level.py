@@ -19,7 +19,7 @@ from idaes.models.control.controller import (
     ControllerType,
     PIDController,
 )
-from idaes_overflow import INFLOW, initialise, plant
+from idaes_overflow import INFLOW, initialise, plant, settle_reactor
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 
@@ -28,6 +28,7 @@ from pyomo_fesd.units import saturation, scale_by_values
 
 END = 600.0  # s
 START, SETPOINT = 1.2, 0.8  # m3
+CONTENTS = {'NaOH': 1.0, 'EthylAcetate': 1.0, 'SodiumAcetate': 49.0, 'Ethanol': 49.0}  # mol/m3, of a reactor at work
 OPEN = 4e-3  # m3/s, through the valve when it is fully open
 GAIN, INTEGRAL, BACK = -0.02, -1e-3, 0.01  # 1/s, 1/s2, 1/s
 VOLUME = 'fs.cstr.control_volume.volume'
@@ -90,6 +91,9 @@ def specify(m):
     for t in m.fs.time:
         m.fs.cstr.volume[t].set_value(START + (SETPOINT - START) * min(1.0, t / 250))
     m.fs.cstr.volume[start].fix(START)
+    for solute, concentration in CONTENTS.items():
+        m.fs.cstr.outlet.conc_mol_comp[start, solute].fix(concentration)
+    settle_reactor(m.fs.cstr)
     pid.mv_integral_component[start].fix(0)
     scale_by_values(m)
     return m
