@@ -8,7 +8,7 @@ import pytest
 import pyomo_fesd
 
 PACKAGE = Path(pyomo_fesd.__file__).parent
-ROOMS = ('dcs', 'elements', 'kinks', 'mpcc')
+ROOMS = ('dcs', 'elements', 'kinks', 'mpcc', 'units')
 
 
 def imports(path):
@@ -36,9 +36,9 @@ def test_the_march_looks_at_elements_and_nothing_looks_at_the_march():
     assert [p for p in others if any(n.startswith('pyomo_fesd.march') for n in imports(p))] == [PACKAGE / '__init__.py']
 
 
-def test_only_the_solver_imports_mpcc():
+def test_only_the_solvers_import_mpcc():
     users = {p.name for p in PACKAGE.glob('*.py') if any(n.startswith('pyomo_fesd.mpcc') for n in imports(p))}
-    assert users == {'solver.py'}
+    assert users == {'solver.py', 'casadi_ipopt.py'}
 
 
 def test_public_names():
@@ -58,6 +58,8 @@ def test_public_names():
         'report',
         'simulate',
         'state_jump',
+        'structure',
         'switches',
         'trajectory',
+        'units',
     ]
