@@ -49,8 +49,8 @@ class Equations:
     unknown : list of VarData
         what the problem determines
     known : list of VarData
-    kind : tuple
-        equal for problems that differ only in the values of what is known
+    kind : int
+        the same for problems that differ only in the values of what is known
     reader : Reader
     """
 
@@ -63,7 +63,7 @@ class Equations:
     length: object
     unknown: list
     known: list
-    kind: tuple
+    kind: int
     reader: object
 
     @property
@@ -151,7 +151,7 @@ class Reader:
     def __init__(self, model, block, grid, times, given):
         self._model, self._block, self._grid, self._times, self._given = model, block, grid, times, given
         self._states = ComponentSet(d.get_state_var() for d in derivatives(model, times.wrt))
-        self._first = times.wrt.first()
+        self._first, self._kinds = times.wrt.first(), {}
         self._read_equations()
         self._read_conditions()
 
@@ -216,13 +216,17 @@ class Reader:
             look.at(expr)
         for expr in (side for some in (pairs, *(p.pairs for p in points.values())) for pair in some for side in pair):
             look.at(expr)
-        unknown = ComponentSet([*([] if length is None else [length]), *copies])
-        unknown.update(v for v in look.variables if self._determined(v, labels))
-        known = [v for v in look.variables if v not in unknown]
-        places = tuple(v in unknown for v in look.variables)
-        kind = (tuple(look.tokens), places, tuple(map(self.bounds, unknown)), *(p.kind for p in points.values()), tuple(limits))
+        unknown = [*([] if length is None else [length]), *copies]
+        chosen = set(map(id, unknown))
+        determined = [id(v) not in chosen and self._determined(v, labels) for v in look.variables]
+        unknown += [v for v, new in zip(look.variables, determined) if new]
+        chosen = set(map(id, unknown))
+        known = [v for v in look.variables if id(v) not in chosen]
+        places = tuple(id(v) in chosen for v in look.variables)
+        bounds, families = tuple(map(self.bounds, unknown)), tuple(p.kind for p in points.values())
+        kind = self._kinds.setdefault((tuple(look.tokens), places, bounds, families, tuple(limits)), len(self._kinds))
         rows = [c.expr for c in equations]
-        return Equations(rows, limits, pairs, points, conditions, labels, length, list(unknown), known, kind, self)
+        return Equations(rows, limits, pairs, points, conditions, labels, length, unknown, known, kind, self)
 
     def sides(self, label):
         """The conditions at one label, by the name of their family."""

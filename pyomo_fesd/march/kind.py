@@ -37,12 +37,15 @@ class State:
     left : array
         values there of all functions of ``kind``, or None
     kind : Kind
+    theta : bytes
+        for each condition whether its G (else its H) is positive in the element, as in eq. (12)
     """
 
     active: dict = None
     event: tuple = None
     left: np.ndarray = None
     kind: object = None
+    theta: bytes = None
 
 
 class Kind:
@@ -105,7 +108,7 @@ class Kind:
         active = dict(zip(self._smooth.names, step.active.tolist()))
         condition = step.event is not None and step.event < 2 * len(active)
         event = (self._smooth.names[step.event // 2], step.event % 2) if condition else None
-        return float(step.length) * self.nominal, State(active, event, step.end, self)
+        return float(step.length) * self.nominal, State(active, event, step.end, self, step.theta)
 
     def window_step(self, equations, most, options):
         """Solve the window; returns what is known of it, and the length."""

@@ -22,6 +22,7 @@ from itertools import product
 
 import numpy as np
 
+from pyomo_fesd.elements.equilibration import TINY
 from pyomo_fesd.march.newton import System
 
 #: What is negative by less than this part of its size, and than this in the solver's scale, is not negative.
@@ -47,6 +48,8 @@ class Step:
         for each condition whether its H is zero in the element (else its G)
     end : array
         values of all functions at the right boundary; nan where the next element may begin with others
+    theta : bytes
+        for each condition whether its G (else its H) is positive
     event : int or None
         the function that arrives at zero there
     """
@@ -55,6 +58,7 @@ class Step:
     length: float
     active: np.ndarray
     end: np.ndarray
+    theta: bytes
     event: int = None
 
 
@@ -89,8 +93,12 @@ class Smooth:
         V, _ = self._f.at(w)
         values = V[self._f.signed]
         self._grow(values)
-        sums = values[: 2 * len(self.names), : self._stages.size].sum(axis=1).reshape(-1, 2)
-        return sums[:, 0] >= sums[:, 1]
+        G, H = self._sums(values)
+        return G >= H
+
+    def _sums(self, values):
+        """The sums of both sides of every condition over the stages."""
+        return values[: 2 * len(self.names), : self._stages.size].sum(axis=1).reshape(-1, 2).T
 
     def step(self, w, active, most, left, event=None):
         """An element of at most the length ``most``; None if another method has to find it.
@@ -247,7 +255,8 @@ class Smooth:
         end = values[:, -1].copy()
         if event is not None:
             end[~f.continuous], end[event] = np.nan, 0.0
-        return Step(w, length, active, end, event)
+        G, H = self._sums(values)
+        return Step(w, length, active, end, (G > H + TINY).tobytes(), event)
 
 
 def _flipped(active, functions):
