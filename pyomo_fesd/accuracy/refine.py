@@ -11,7 +11,7 @@ Does not apply: to errors that no grid shows, such as a local minimum in place o
 import logging
 import time
 from dataclasses import dataclass
-from math import ceil, nan
+from math import ceil, inf, nan
 
 import numpy as np
 import pandas as pd
@@ -35,9 +35,8 @@ logger = logging.getLogger('pyomo_fesd')
 FIRST, FIRST_EACH = 8, 2
 #: How exactly equations are solved, as a part of the tolerance; within what Ipopt can do.
 EXACT = 1e-3
-#: Columns of errors, and those of the table that may be left out.
+#: Columns of errors.
 COLUMNS = ('states', 'switches', 'objective', 'quantities')
-OPTIONAL = ('objective', 'quantities')
 NOT_REACHED = (
     "refine: the tolerance %.1e is not reached in %d rounds; the estimated error is %.1e. Take more rounds (max_rounds), more points "
     "(ncp), or more elements in the first round (nfe)."
@@ -116,11 +115,12 @@ def refine(
     """
     wrt = find_continuous_set(model, wrt, 'refine')
     _check(model, wrt, tolerance, max_rounds)
+    quantities = _data(quantities)
     elements = TransformationFactory('fesd.finite_elements').CONFIG
     keywords = {name: options.pop(name) for name in list(options) if name in elements} | {'ncp': ncp, 'scheme': scheme}
     stages = len(wrt) - 1
     numbers = share_elements(wrt, nfe if nfe is not None else stages * max(FIRST_EACH, ceil(FIRST / stages)))
-    return _Refining(model, wrt, tolerance, keywords, options, _data(quantities), tee).run(numbers, max_rounds)
+    return _Refining(model, wrt, tolerance, keywords, options, quantities, tee).run(numbers, max_rounds)
 
 
 class _Refining:
@@ -130,6 +130,7 @@ class _Refining:
         self._model, self._wrt, self._tolerance = model, wrt, tolerance
         self._keywords, self._quantities, self._tee = keywords, quantities, tee
         self._optimise = any(True for _ in _objectives(model))
+        self._optional = {'objective': self._optimise, 'quantities': bool(quantities)}
         self._options = {'branch_tol': float(np.clip(EXACT * tolerance, 1e-12, 1e-9))} | options
         self._scheme = 2 * keywords['ncp'] - (1 if keywords['scheme'] == 'LAGRANGE-RADAU' else 0)
         self._most = most_numbers(wrt, keywords['ncp'])
@@ -220,7 +221,7 @@ class _Refining:
     def _table(self):
         columns = ['nfe', 'elements', *COLUMNS, 'order', 'pairs', 'seconds', 'note']
         table = pd.DataFrame(self._rows, columns=columns, index=pd.RangeIndex(1, 1 + len(self._rows), name='round'))
-        return table.drop(columns=[c for c in OPTIONAL if table[c].isna().all()])
+        return table.drop(columns=[name for name, there in self._optional.items() if not there])
 
     def _say(self):
         if self._tee:
@@ -240,13 +241,15 @@ def _data(quantities):
     named = quantities if isinstance(quantities, (list, tuple)) else [] if quantities is None else [quantities]
     found = []
     for q in named:
+        if not hasattr(q, 'is_indexed'):
+            raise FesdError(q, f"refine: quantities: this is a {type(q).__name__}, not a component", "give e.g. m.x[2] or m.cost")
         datas = q.values() if q.is_indexed() else [q]
         found += [(d.parent_component(), d.index()) for d in datas]
     return found
 
 
 def _check(model, wrt, tolerance, max_rounds):
-    if not tolerance > 0:
+    if not 0 < tolerance < inf:
         raise FesdError('tolerance', f"refine: it is {tolerance}", "give a positive number, e.g. 1e-6")
     if max_rounds < 2:
         raise FesdError('max_rounds', f"refine: it is {max_rounds}", "an error is estimated by comparison: give 2 at least")
