@@ -59,9 +59,7 @@ def difference(coarse, fine):
     if [(p.stage, p.modes) for p in coarse.pieces] != [(p.stage, p.modes) for p in fine.pieces]:
         return None
     pairs = list(zip(coarse.pieces, fine.pieces))
-    states = [
-        _apart(coarse, fine, name, c, f) / size for name, size in fine.states.items() for c, f in pairs
-    ]
+    states = [_apart(coarse, fine, name, c, f) / size for name, size in fine.states.items() for c, f in pairs]
     horizon = fine.pieces[-1].nodes[-1] - fine.pieces[0].nodes[0]
     switches = [_relative(c.nodes[0], f.nodes[0], min(1.0, horizon)) for c, f in pairs]
     quantities = [_relative(a, b) for a, b in zip(coarse.quantities, fine.quantities)]
@@ -110,7 +108,7 @@ def observed_order(numbers, largest, order):
         return LEAST_ORDER
 
     def mismatch(p):
-        a, b, c = (n ** -p for n in np.divide(numbers, numbers[0]))
+        a, b, c = (n**-p for n in np.divide(numbers, numbers[0]))
         return np.log((a - b) / (b - c)) - np.log(largest[0] / largest[1])
 
     # E_k is at most about the error of solution k - 1; where the differences do not add up, as in a layer that no grid resolves yet,

@@ -148,7 +148,7 @@ class _Refining:
                 error, following = self._judge(numbers, failure)
                 self._rows[-1]['seconds'] = time.perf_counter() - started
                 self._say()
-                reached = error <= self._tolerance
+                reached = bool(error <= self._tolerance)
                 last = reached or len(self._rows) == max_rounds or following == numbers
                 if last and failure is None:
                     now.keep()
@@ -206,7 +206,7 @@ class _Refining:
         self._best = now
         found = judge(self._rounds, self._scheme, self._tolerance, self._most)
         row |= {c: getattr(found.error, c) for c in COLUMNS} | {'order': found.order, 'pairs': now.solution.pairs}
-        return found.error.largest, found.following
+        return float(found.error.largest), found.following
 
     def _return_to_best(self, failure):
         """The last round had no solution: the one before it that had one is solved again."""
