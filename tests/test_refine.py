@@ -16,10 +16,11 @@ from hypothesis import strategies as st
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
-from pyomo_fesd.accuracy import refine as module
+from pyomo_fesd.accuracy import solver
 from pyomo_fesd.accuracy.attempt import attempt
 from pyomo_fesd.accuracy.estimate import LEAST_ORDER, observed_order
 from pyomo_fesd.accuracy.placing import GROWTH, effective, next_numbers
+from pyomo_fesd.accuracy.solution import read_solution
 from pyomo_fesd.accuracy.start import start_from
 from tests.models import dcs, finite_elements, snapshot
 from tests.problems import held_control, setpoint
@@ -134,7 +135,7 @@ def test_start_values_are_a_solution_where_the_grid_is_exact():
             if read:
                 start_from(m, m.t, read[0])
             results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=bool(read))
-            read.append(module.read_solution(m, m.t, []))
+            read.append(read_solution(m, m.t, []))
             assert str(results.solver.stationarity) == 'B'
     # one branch, in two stages
     assert results.solver.nlps <= 2
@@ -197,7 +198,7 @@ def test_the_last_solution_is_found_again_where_a_finer_grid_has_none(monkeypatc
             raise FesdError(wrt, 'none', 'none')
         return pyomo_fesd.simulate(model, wrt, **options)
 
-    monkeypatch.setattr(module, 'simulate', fails_once)
+    monkeypatch.setattr(solver, 'simulate', fails_once)
     m = dcs(oscillator.build())
     assert not pyomo_fesd.refine(m, 1e-6, max_rounds=3).reached
     assert calls[3] == calls[1] == len(m.t)
@@ -308,7 +309,7 @@ def test_an_interruption_leaves_the_model_as_it_was(monkeypatch):
     def interrupt(*args, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(module, 'simulate', interrupt)
+    monkeypatch.setattr(solver, 'simulate', interrupt)
     m = dcs(signum.build())
     before = snapshot(m)
     with pytest.raises(KeyboardInterrupt):

@@ -2,8 +2,8 @@
 
     python docs/benchmarks/accuracy.py [--only NAME] [--fresh]
 
-writes accuracy.csv and accuracy.png beside this file; rows that are there already are skipped.  ``best N`` is the smallest number of
-equal elements (within 5 %) whose true error is below the tolerance, found by trying.
+writes accuracy.csv and accuracy.png beside this file; rows that are there already are skipped.  ``best N`` is the smallest number
+of equal elements (within 5 %) whose true error is below the tolerance, found by trying.
 """
 
 import argparse
@@ -94,7 +94,7 @@ def _relative(a, b):
 
 
 def stiff(rate=STIFF):
-    """Prothero and Robinson: x' = -rate (x - cos t) - sin t down to 1/2, then x' = -1; from x(0) = 1 the solution is cos t at first."""
+    """Prothero and Robinson: x' = -rate (x - cos t) - sin t down to 1/2, then -1; from x(0) = 1 the solution is cos t at first."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, 2))
     m.x = pyo.Var(m.t, initialize=1)
@@ -112,7 +112,7 @@ def stiff(rate=STIFF):
 
 
 def controlled_tank():
-    """The gas-liquid tank with its valve as a free control: min int 100 (u - 0.1)^2 dt + M_L(25), 0 <= u <= 0.15; u = 0.1, J = 250."""
+    """The gas-liquid tank with its valve as a control: min int 100 (u - 0.1)^2 dt + M_L(25), 0 <= u <= 0.15; u = 0.1, J = 250."""
     tank = gas_liquid_tank
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, CONTROL_HORIZON))

@@ -6,7 +6,7 @@ A clone would do no better: rules that close over the model (``lambda d, t: m.x[
 import logging
 from contextlib import ExitStack, contextmanager
 
-from pyomo.core import BooleanVar, Block, Var
+from pyomo.core import Block, BooleanVar, Var
 from pyomo.dae import DerivativeVar
 from pyomo.gdp import Disjunct
 

@@ -8,8 +8,9 @@ is the error of the finer one, with a factor 2 for what is not asymptotic yet.  
 
     (N_{k-2}**-p - N_{k-1}**-p)/(N_{k-1}**-p - N_k**-p) = E_{k-1}/E_k,
 
-is never taken larger than that of the scheme, nor than log(E_{k-1}/E_k)/log(N_{k-1}/N_{k-2}), and is 1 as long as there are two rounds only.  Rounds whose active sets follow each
-other differently cannot be compared: the coarse one knows nothing of the solution yet.
+is never taken larger than that of the scheme, nor than log(E_{k-1}/E_k)/log(N_{k-1}/N_{k-2}), and is 1 as long as there are two
+rounds only.  Rounds whose active sets follow each other differently cannot be compared: the coarse one knows nothing of the
+solution yet.
 
 Where the elements are shared differently among control stages, N is the *effective* number (``placing``).
 
@@ -111,8 +112,8 @@ def observed_order(numbers, largest, order):
         a, b, c = (n**-p for n in np.divide(numbers, numbers[0]))
         return np.log((a - b) / (b - c)) - np.log(largest[0] / largest[1])
 
-    # E_k is at most about the error of solution k - 1; where the differences do not add up, as in a layer that no grid resolves yet,
-    # the model says too much
+    # E_k is at most about the error of solution k - 1; where the differences do not add up, as in a layer that no grid resolves
+    # yet, the model says too much
     most = float(np.clip(np.log(largest[0] / largest[1]) / np.log(numbers[1] / numbers[0]), LEAST_ORDER, order))
     if mismatch(LEAST_ORDER) >= 0:
         return LEAST_ORDER

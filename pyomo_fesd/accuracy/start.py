@@ -6,8 +6,8 @@ polynomials.
 
 Takes: a model on its new grid, and the ``Solution``.
 Leaves: values of all variables over time, of the element lengths, and of variables without time.
-Does not apply: to what stands at element boundaries only (modes with memory, jumps); there a simulation with the old controls is the
-start, if it comes to its end.
+Does not apply: to what stands at element boundaries only (modes with memory, jumps); there a simulation with the old controls is
+the start, if it comes to its end.
 """
 
 import numpy as np
