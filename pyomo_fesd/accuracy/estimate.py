@@ -2,9 +2,9 @@
 
 With the numbers of elements N_1 < N_2 < ... and the difference E_k between the solutions k - 1 and k,
 
-    e_k = 2 E_k / ((N_k/N_{k-1})**p - 1)
+    e_k = 4 E_k / ((N_k/N_{k-1})**p - 1)
 
-is the error of the finer one, with a factor 2 for what is not asymptotic yet.  The order p is observed: it solves
+is the error of the finer one, with a factor 4 for what is not asymptotic yet.  The order p is observed: it solves
 
     (N_{k-2}**-p - N_{k-1}**-p)/(N_{k-1}**-p - N_k**-p) = E_{k-1}/E_k,
 
@@ -26,7 +26,7 @@ from scipy.interpolate import KroghInterpolator
 from scipy.optimize import brentq
 
 #: For what is not asymptotic yet.
-SAFETY = 2.0
+SAFETY = 4.0
 #: The least order that is believed.
 LEAST_ORDER = 0.5
 
