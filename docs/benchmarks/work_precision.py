@@ -69,6 +69,11 @@ def key(run):
     return tuple(map(str, run))
 
 
+def short(value):
+    """Numbers without their noise."""
+    return f'{value:.6g}' if isinstance(value, float) else value
+
+
 def read_done():
     """Runs that the file holds."""
     if not CSV.exists():

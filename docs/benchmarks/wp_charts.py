@@ -119,7 +119,7 @@ def orders(table):
     """Error against the number of elements, with the fitted slope on each line."""
     figure = Figure(figsize=(9, 4.2), layout='constrained')
     axes = dict(zip(('Radau', 'Gauss'), figure.subplots(1, 2, sharey=True)))
-    for (scheme, K), numbers in ORDERS.items():
+    for scheme, K in ORDERS:
         group = order_rows(table, scheme, K)
         if len(group) < 2:
             continue
