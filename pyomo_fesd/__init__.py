@@ -8,6 +8,7 @@ import pyomo.environ  # noqa: F401  registers Pyomo's own plug-ins first
 
 from pyomo_fesd import casadi_ipopt as _casadi_ipopt  # noqa: F401
 from pyomo_fesd import units
+from pyomo_fesd.accuracy.refine import refine
 from pyomo_fesd.clock import clock
 from pyomo_fesd.dcs import transformation as _dcs  # noqa: F401
 from pyomo_fesd.elements import transformation as _elements  # noqa: F401
@@ -37,6 +38,7 @@ __all__ = [
     'plot',
     'positive_part',
     'projection',
+    'refine',
     'report',
     'simulate',
     'state_jump',

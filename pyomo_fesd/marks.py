@@ -21,9 +21,9 @@ GUARD              Expression (data)         ``True``: a jump of the state happe
 RESET              Var (data)                the Expression of the value after the jump whose guard stands on the same block
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
 TENTATIVE          Complementarity (data)    ``True``: one of those DECIDED that is dropped where it leaves no solution
-MOVE               Complementarity (data)    another pair whose zero side it may take over, or None if its first side may become
-                                             zero; all on one block do so together
-                   Var (data)                where the move starts it; ``True``: worth a look only where it is at its lower bound
+MOVE               Expression (data)         what changes together, as (component, value): of a pair, another pair whose zero side
+                                             it may take over, or None if its first side may become zero; of a Var, where the move
+                                             starts it, or ``True``: worth a look only where it is at its lower bound
 ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
                                              certificate looks beyond them
 PENALTY            Expression                its weight rho; guides the homotopy, never part of the reported objective

@@ -31,6 +31,7 @@ from pyomo_fesd.elements.moves import add_moves
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
 from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.elements.right_limits import RightLimits
+from pyomo_fesd.elements.space import refuse_waiting_space
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set
 
@@ -223,6 +224,7 @@ class FiniteElements(Transformation):
         check_told(config.continuous, config.piecewise_constant, wrt)
         check_free_time(config.final_time, config.stage_lengths, wrt)
         refuse_lists_of_times(instance, TimeIndex(wrt))
+        refuse_waiting_space(instance.model(), wrt)
         if discretised(wrt):
             return
         if config.stages is not None:

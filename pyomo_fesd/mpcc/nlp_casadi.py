@@ -67,9 +67,14 @@ class _Watch(ca.Callback):
         length = {'x': n, 'lam_x': n, 'f': 1, 'g': m, 'lam_g': m, 'lam_p': p}[ca.nlpsol_out(i)]
         return ca.Sparsity.dense(length, 1)
 
-    def eval(self, arg):
+    def has_eval_buffer(self):
+        # no copies of the point, which nobody looks at
+        return True
+
+    def eval_buffer(self, arg, res):
         self.left -= 1
-        return [float(self.left < 0 or self._deadline.expired())]
+        res[0].cast('d')[0] = self.left < 0 or self._deadline.expired()
+        return 0
 
 
 class _CasadiNlp(NlpSolver):

@@ -76,7 +76,7 @@ class Mpcc:
     artificial : ComponentMap Var -> float
         variables whose bounds belong to the method, with their upper bound in the homotopy
     moves : list of lists of (component, value)
-        marks MOVE, those of one move together
+        marks MOVE
     objective : ObjectiveData or None
     sources : list of ComplementarityData
         every active condition
@@ -116,7 +116,7 @@ def read_problem(model, solver='mpec_hybrid'):
             problem.conditions.append(Condition(source, *condition))
     problem.penalties = list(marks.marked(model, marks.PENALTY))
     problem.artificial = ComponentMap(marks.marked(model, marks.ARTIFICIAL))
-    problem.moves = [list(suffix.items()) for suffix in marks.suffixes(model, marks.MOVE)]
+    problem.moves = [list(together) for _, together in marks.marked(model, marks.MOVE)]
     return problem
 
 
