@@ -223,8 +223,9 @@ class March:
 
     def _problem(self, element):
         if element.n not in self._equations:
-            limits = {name: rows for law in (*self._memories, self._jumps) for name, rows in law.limits(element).items()}
-            self._equations[element.n] = self._reader.element(element, limits)
+            with phase(self._timer, 'read'):
+                limits = {name: rows for law in (*self._memories, self._jumps) for name, rows in law.limits(element).items()}
+                self._equations[element.n] = self._reader.element(element, limits)
         return self._equations[element.n]
 
     def _warn_short(self):
