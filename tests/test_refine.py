@@ -60,11 +60,11 @@ def test_more_digits(name, tolerance):
     assert found.reached and error <= tolerance
 
 
-@pytest.mark.parametrize('scheme, ncp', [('LAGRANGE-RADAU', 2), ('LAGRANGE-LEGENDRE', 2), ('LAGRANGE-LEGENDRE', 3)])
-def test_schemes(scheme, ncp):
+@pytest.mark.parametrize('scheme, ncp, tolerance', [('LAGRANGE-RADAU', 2, 1e-2), ('LAGRANGE-LEGENDRE', 3, 1e-4)])
+def test_schemes(scheme, ncp, tolerance):
     m = dcs(oscillator.build())
-    assert pyomo_fesd.refine(m, 1e-3, ncp=ncp, scheme=scheme).reached
-    assert oscillator.error(m) <= 1e-3
+    assert pyomo_fesd.refine(m, tolerance, ncp=ncp, scheme=scheme).reached
+    assert oscillator.error(m) <= tolerance
 
 
 def test_an_answer_that_is_exact_takes_two_rounds():
@@ -287,7 +287,7 @@ def waiting():
 def infeasible():
     m = dcs(held_control.build())
     m.too_far = pyo.Constraint(expr=m.x[2] >= 1)
-    return m, {'piecewise_constant': [m.u], 'max_rounds': 2}
+    return m, {'piecewise_constant': [m.u], 'max_rounds': 2, 'nfe': 2}
 
 
 def with_keywords(**keywords):
