@@ -17,8 +17,8 @@ from pyomo_fesd.complementarity import read
 
 #: How many a message names.
 SHOWN = 3
-#: A residual relative to its terms that is none.
-NONE = 1e-6
+#: A residual relative to its terms, and one by itself, that is none.
+NONE, NOTHING = 1e-6, 1e-8
 
 
 def largest_residuals(model, times, equations, values):
@@ -36,7 +36,7 @@ def largest_residuals(model, times, equations, values):
     rows = [c for c in rows if c.equality and times.time(c) in labels and not marks.is_generated(c)]
     with _with_values(equations.unknown, values):
         missed = [(*_residual(c), c) for c in rows] + [(*_distance(c), c) for c in equations.conditions]
-    missed = sorted((m for m in missed if not m[0] <= NONE), key=lambda m: -m[0])[:SHOWN]
+    missed = sorted((m for m in missed if not (m[0] <= NONE or m[1] <= NOTHING)), key=lambda m: -m[0])[:SHOWN]
     if not missed:
         return ''
     home = missed[0][-1].parent_block()
