@@ -69,6 +69,11 @@ def key(run):
     return tuple(map(str, run))
 
 
+def short(value):
+    """Numbers without their noise."""
+    return f'{value:.6g}' if isinstance(value, float) else value
+
+
 def read_done():
     """Runs that the file holds."""
     if not CSV.exists():
@@ -88,7 +93,9 @@ def study(only, limit):
             writer.writeheader()
         for k, run in enumerate(runs):
             row = worker.row(run, limit)
-            writer.writerow({name: f'{v:.4g}' if isinstance(v, float) and name not in Run._fields else v for name, v in row.items()})
+            writer.writerow(
+                {name: f'{v:.4g}' if isinstance(v, float) and name not in Run._fields else v for name, v in row.items()}
+            )
             stream.flush()
             said = f"{row.get('total', float('nan')):6.2f} s  error {row.get('error', float('nan')):.1e}  {row['status'][:60]}"
             print(f'{k + 1}/{len(runs)}', *(part for part in run if part), said, flush=True)

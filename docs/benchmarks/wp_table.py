@@ -9,7 +9,6 @@ import ocp_cartpole
 import ocp_motor
 import ocp_sliding
 import wp_events
-import wp_nosnoc
 import wp_pyomo
 from wp_models import ControlModel, SystemModel
 from wp_systems import SYSTEMS
@@ -35,6 +34,13 @@ OURS, MARCH, FIXED, TANH, SQRT, BIG_M, EVENTS = (
 NOSNOC, TIGHT, STEPS, TIGHT_STEPS = 'nosnoc', 'nosnoc, 1e-12', 'nosnoc, steps', 'nosnoc, steps, 1e-12'
 NOSNOCS = (NOSNOC, TIGHT, STEPS, TIGHT_STEPS)
 
+
+def _nosnoc(*args, **kwds):
+    import wp_nosnoc  # its package is no dependency of this one
+
+    return wp_nosnoc.nosnoc(*args, **kwds)
+
+
 METHODS = {
     OURS: wp_pyomo.ours,
     MARCH: wp_pyomo.simulate,
@@ -43,10 +49,10 @@ METHODS = {
     SQRT: partial(wp_pyomo.smoothing, shape='sqrt'),
     BIG_M: wp_pyomo.big_m,
     EVENTS: wp_events.events,
-    NOSNOC: wp_nosnoc.nosnoc,
-    TIGHT: partial(wp_nosnoc.nosnoc, tolerance=1e-12),
-    STEPS: partial(wp_nosnoc.nosnoc, by_steps=True),
-    TIGHT_STEPS: partial(wp_nosnoc.nosnoc, by_steps=True, tolerance=1e-12),
+    NOSNOC: _nosnoc,
+    TIGHT: partial(_nosnoc, tolerance=1e-12),
+    STEPS: partial(_nosnoc, by_steps=True),
+    TIGHT_STEPS: partial(_nosnoc, by_steps=True, tolerance=1e-12),
 }
 
 

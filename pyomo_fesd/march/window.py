@@ -76,4 +76,3 @@ class Window:
     def put_out(self, equations):
         """Write what was found into the user's model."""
         put_out(equations, self.values)
-

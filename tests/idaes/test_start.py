@@ -76,4 +76,4 @@ def test_a_failed_element_names_the_unit():
     idaes_overflow.specify(m)
     m.fs.cstr.outlet.flow_vol.fix(idaes_overflow.INFLOW + 4e-3)
     with pytest.raises(pyomo_fesd.FesdError, match=r'from time 150; where one is forced, largest residuals in fs\.'):
-        pyomo_fesd.simulate(m, m.fs.time, relaxation_iterations=30, branch_iterations=30)
+        pyomo_fesd.simulate(m, m.fs.time, max_iterations=100)
