@@ -22,6 +22,8 @@ from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
 from pyomo_fesd.march.kind import Kind, State, active_at_first
+from pyomo_fesd.march.prescribed import prescribed_states
+from pyomo_fesd.march.residuals import largest_residuals
 from pyomo_fesd.march.shares import Even, Passed, equal_lengths, wanted
 from pyomo_fesd.march.window import Window
 from pyomo_fesd.mpcc.phase import phase
@@ -65,6 +67,7 @@ class March:
     def _given(self, inputs):
         """Inputs, controls that are held on each stage, and weights of modes with memory."""
         given = ComponentSet(v for u in inputs for v in u.values())
+        given.update(prescribed_states(self._model, self._wrt))
         for row in self._block.held.values():
             # the value at the end of its stage counts
             *others, last = sorted(variables_of([row.body]), key=self._times.time)
@@ -131,7 +134,7 @@ class March:
             with phase(self._timer, 'compile'):
                 window = Window(equations, self._options)
             with phase(self._timer, 'window'):
-                self._require(window.solve(equations))
+                self._require(window.solve(equations), equations, window)
             window.put_out(equations)
 
     def _through(self, shares):
@@ -215,9 +218,11 @@ class March:
             answer, h = kind.window_step(equations, most, options)
             if answer.stationarity == 'B' and h > NO_STEP * most:
                 return kind.take_window(equations, most, h)
-        self._require(answer)
+        self._require(answer, equations, kind.window)
+        kind.window.force(equations, most / kind.nominal)
+        missed = largest_residuals(self._model, self._times, equations, kind.window.values)
         raise self._stuck(
-            f"no step is possible from time {self._time:.6g}",
+            f"no step is possible from time {self._time:.6g}" + (f"; where one is forced, {missed}" if missed else ''),
             "look for a bound that the solution reaches there, or for a state from which no mode leads on",
         )
 
@@ -244,10 +249,11 @@ class March:
                         least,
                     )
 
-    def _require(self, answer):
+    def _require(self, answer, equations, window):
         if answer.stationarity != 'B':
+            missed = largest_residuals(self._model, self._times, equations, window.values)
             raise self._stuck(
-                f"no solution at time {self._time:.6g}: {answer.reason}",
+                f"no solution at time {self._time:.6g}: {missed or answer.reason or answer.outcome}",
                 "check the equations there; more elements help where the solution is steep",
             )
 
