@@ -69,6 +69,22 @@ def discretise(m, elements=ELEMENTS, ncp=NCP, scheme='LAGRANGE-RADAU'):
     return m
 
 
+def plant(x, u):
+    """For ocp_replay: the friction and the rate of the cost."""
+    _, theta, v, w = x
+    coupling = M2 * LENGTH * np.cos(theta)
+    inertia = np.array([[M1 + M2, coupling], [coupling, M2 * LENGTH**2]])
+    forces = np.array([u[0] + M2 * LENGTH * w**2 * np.sin(theta), -M2 * G * LENGTH * np.sin(theta)])
+    f = np.append([v, w], np.linalg.solve(inertia, forces))
+    g = np.append([0.0, 0.0], np.linalg.solve(inertia, [-F, 0.0]))[:, None]
+    return f, g, np.array([v]), np.eye(4)[[2]], distance(RUNNING, x) + u[0] ** 2
+
+
+def missed(x):
+    """How far from the goal the end must be: nothing is asked; and what its state costs."""
+    return 0.0, distance(FINAL, x)
+
+
 def with_nosnoc(stages=STAGES, elements=ELEMENTS, ncp=NCP, scheme='RADAU', u=None, **settings):
     """The same problem in nosnoc."""
     import casadi as ca

@@ -55,6 +55,20 @@ def discretise(m, elements=ELEMENTS, ncp=NCP, scheme='LAGRANGE-RADAU'):
     return m
 
 
+def plant(x, u):
+    """For ocp_replay: the friction and the rate of the cost."""
+    x1, v1, x2, v2, current = x
+    spring = K * (x2 - x1)
+    f = np.array([v1, (spring + K_F * current) / M1, v2, -spring / M2, (u[0] - R * current - K_S * v1) / L])
+    along = np.eye(5)[[1]]
+    return f, -F_R / M1 * along.T, np.array([v1]), along, u[0] ** 2
+
+
+def missed(x):
+    """How far from the goal the end is, and what its state costs."""
+    return float(np.abs(x - GOAL).max()), 0.0
+
+
 def with_nosnoc(stages=STAGES, elements=ELEMENTS, ncp=NCP, scheme='RADAU', u=None, **settings):
     """The same problem in nosnoc."""
     import casadi as ca

@@ -61,6 +61,20 @@ def discretise(m, elements=ELEMENTS, ncp=NCP, scheme='LAGRANGE-RADAU'):
     return m
 
 
+def plant(x, u):
+    """For ocp_replay: both relays and the rate of the cost."""
+    q1, q2, v1, v2 = x
+    f, g = np.array([v1, v2, *u]), -np.eye(4)[:, :2]
+    surfaces = np.array([q1 + 0.15 * q2**2, q2 - 0.05 * q1**3])
+    gradients = np.array([[1, 0.3 * q2, 0, 0], [-0.15 * q1**2, 1, 0, 0]])
+    return f, g, surfaces, gradients, v1**2 + v2**2
+
+
+def missed(x):
+    """How far from the goal the end is, and what its state costs."""
+    return float(np.abs(x[:2] - GOAL).max()), 0.0
+
+
 def with_nosnoc(stages=STAGES, elements=ELEMENTS, ncp=NCP, scheme='RADAU', u=None, **settings):
     """The same problem in nosnoc."""
     import casadi as ca

@@ -56,6 +56,19 @@ def discretise(m, elements=ELEMENTS, ncp=NCP, scheme='LAGRANGE-RADAU'):
     return m
 
 
+def plant(x, u):
+    """For ocp_replay: liquid (+1) or gas (-1) leaves; and the rate of the cost."""
+    gas, liquid = x
+    out = u[0] * (gas * R * T / (V - liquid / RHO_L) - 1)
+    f, g = np.array([F_G - out / 2, F_L - out / 2]), np.array([[out / 2], [-out / 2]])
+    return f, g, np.array([liquid - V_S * RHO_L]), np.array([[0.0, 1.0]]), 100 * (u[0] - U_BEST) ** 2
+
+
+def missed(x):
+    """How far from the goal the end must be: nothing is asked; and what its state costs."""
+    return 0.0, float(x[1])
+
+
 def with_nosnoc(stages=STAGES, elements=ELEMENTS, ncp=NCP, scheme='RADAU', u=None, **settings):
     """The same problem in nosnoc, with the pressure eliminated."""
     import casadi as ca
