@@ -21,6 +21,8 @@ HORIZON, STAGES, ELEMENTS, NCP = 5.0, 20, 2, 2
 F, M1, M2, LENGTH, G = 2.0, 1.0, 0.1, 1.0, 9.81
 START, GOAL = (1.0, 0.0, 0.0, 0.0), (0.0, pi, 0.0, 0.0)
 U_MAX, X_MAX = 30.0, 5.0
+U_RANGE, CONTROLS = (-U_MAX, U_MAX), 1
+REFERENCE = 677.4705
 RUNNING, FINAL = (10.0, 100.0, 1.0, 1.0), (500.0, 100.0, 10.0, 10.0)
 
 
@@ -67,22 +69,6 @@ def discretise(m, elements=ELEMENTS, ncp=NCP, scheme='LAGRANGE-RADAU'):
     number = elements * (len(m.t) - 1)
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=number, ncp=ncp, scheme=scheme, piecewise_constant=[m.u])
     return m
-
-
-def plant(x, u):
-    """For ocp_replay: the friction and the rate of the cost."""
-    _, theta, v, w = x
-    coupling = M2 * LENGTH * np.cos(theta)
-    inertia = np.array([[M1 + M2, coupling], [coupling, M2 * LENGTH**2]])
-    forces = np.array([u[0] + M2 * LENGTH * w**2 * np.sin(theta), -M2 * G * LENGTH * np.sin(theta)])
-    f = np.append([v, w], np.linalg.solve(inertia, forces))
-    g = np.append([0.0, 0.0], np.linalg.solve(inertia, [-F, 0.0]))[:, None]
-    return f, g, np.array([v]), np.eye(4)[[2]], distance(RUNNING, x) + u[0] ** 2
-
-
-def missed(x):
-    """How far from the goal the end must be: nothing is asked; and what its state costs."""
-    return 0.0, distance(FINAL, x)
 
 
 def with_nosnoc(stages=STAGES, elements=ELEMENTS, ncp=NCP, scheme='RADAU', u=None, **settings):

@@ -20,6 +20,7 @@ HORIZON, STAGES, ELEMENTS, NCP = 25.0, 5, 5, 3
 F_L, F_G, V, V_S, R, T, RHO_L = 2.5, 0.1, 10.0, 5.0, 0.0820573661, 300.0, 50.0
 START = (6.824494, 260.0)
 U_MAX, U_START, U_BEST = 0.15, 0.05, 0.1
+U_RANGE, CONTROLS = (0.0, U_MAX), 1
 REFERENCE = 250.0
 
 
@@ -54,19 +55,6 @@ def discretise(m, elements=ELEMENTS, ncp=NCP, scheme='LAGRANGE-RADAU'):
     number = elements * (len(m.t) - 1)
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=number, ncp=ncp, scheme=scheme, piecewise_constant=[m.u])
     return m
-
-
-def plant(x, u):
-    """For ocp_replay: liquid (+1) or gas (-1) leaves; and the rate of the cost."""
-    gas, liquid = x
-    out = u[0] * (gas * R * T / (V - liquid / RHO_L) - 1)
-    f, g = np.array([F_G - out / 2, F_L - out / 2]), np.array([[out / 2], [-out / 2]])
-    return f, g, np.array([liquid - V_S * RHO_L]), np.array([[0.0, 1.0]]), 100 * (u[0] - U_BEST) ** 2
-
-
-def missed(x):
-    """How far from the goal the end must be: nothing is asked; and what its state costs."""
-    return 0.0, float(x[1])
 
 
 def with_nosnoc(stages=STAGES, elements=ELEMENTS, ncp=NCP, scheme='RADAU', u=None, **settings):
