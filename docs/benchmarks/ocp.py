@@ -3,8 +3,8 @@
     python docs/benchmarks/ocp.py [--only sliding,motor] [--fresh] [--limit 120]
 
 Same control stages, elements and collocation points.  For each problem and method (1) times: three runs from the model's own
-start values, each in a process of its own, from the model to the solution, all imports done; (2) starts: ten random controls, the same for
-both.  Writes ocp.csv, a row a run, in which no run is done twice, ocp_summary.csv, and ocp.png, all beside this file.
+start values, each in a process of its own, from the model to the solution, all imports done; (2) starts: ten random controls, the
+same for both.  Writes ocp.csv, a row a run, in which no run is done twice, ocp_summary.csv, and ocp.png, all beside this file.
 """
 
 import argparse

@@ -12,12 +12,12 @@ from pyomo_fesd.mpcc.active_set import ActiveSets, active_sets
 from pyomo_fesd.mpcc.nlp import NlpResult
 from pyomo_fesd.mpcc.recovery import LADDER
 
-#: For each path the form of its first relaxation and that of the others, without an objective and with one.  Without one any
-#: solution will do, and the elastic form is by far the quickest to one.  With one, Scholtes' form at the first eps puts every pair
-#: in the middle, whatever the size of the objective; from there the elastic form settles early in the same minima as Scholtes'.
+#: For each path the form of its first relaxation and that of the others, without an objective and with one.  The elastic form is by
+#: far the quickest; Scholtes' at the first eps puts every pair in the middle, whatever the size of the objective.  The next path
+#: is for what the one before does not settle.
 AUTO = {
     False: (('elastic', 'elastic'), ('scholtes', 'scholtes')),
-    True: (('scholtes', 'elastic'), ('scholtes', 'scholtes')),
+    True: (('elastic', 'elastic'), ('scholtes', 'elastic'), ('scholtes', 'scholtes')),
 }
 #: From this eps on multipliers are carried along; before, Ipopt's own centring finds better minima (a car: 13.3, not 16).
 CARRIED = 1e-2
@@ -77,7 +77,7 @@ class Homotopy:
             self.run.eps = stage.eps
             form = self._form(stage)
             carried = stage.duals if stage.eps <= CARRIED * ROUND_OFF and stage.before == form else None
-            relaxed = self._steps.relax(form, stage.w, stage.eps, carried, self._budget(carried))
+            relaxed = self._steps.relax(form, stage.w, stage.eps, carried, self._budget(stage, carried))
             self._steps.keep_least_infeasible(relaxed.w)
             stage = self._next(stage, relaxed) if self._steps.usable(relaxed) else self._recover(stage, relaxed)
 
@@ -85,9 +85,12 @@ class Homotopy:
         first, later = self._paths[stage.path]
         return first if stage.before is None else later
 
-    def _budget(self, carried):
-        """Iterations of a relaxation; None, for all that the solver has, where it starts from afar or the user has set them."""
-        return None if carried is None or 'max_iter' in self._options.nlp_options else self._options.relaxation_iterations
+    def _budget(self, stage, carried):
+        """Iterations of a relaxation; None, for all that the solver has, where it starts from afar on the last path, or the user
+        has set them.
+        """
+        afar = carried is None and stage.path + 1 == len(self._paths)
+        return None if afar or 'max_iter' in self._options.nlp_options else self._options.relaxation_iterations
 
     def restore(self, w):
         """The nearest point that the feasibility phase finds, with pairs as loose as at the start."""
@@ -138,10 +141,10 @@ class Homotopy:
         return None not in (before, now) and max(before, now) - best <= same
 
     def _other_form(self, stage, relaxed):
-        """Where a path ends with nothing feasible the other form takes another one."""
-        if self._branches is None or self.run.point is not None or stage.path + 1 == len(self._paths):
+        """Where a path ends with nothing certified the next one begins."""
+        if self._branches is None or stage.path + 1 == len(self._paths) or self._certified():
             return None
-        self._steps.note("nothing feasible on this path, other form", relaxed.w)
+        self._steps.note("nothing certified on this path, other form", relaxed.w)
         self._gap.restart()
         self._branches.forget()
         return _Stage(stage.path + 1, self._start, self._options.eps_init)
