@@ -22,7 +22,7 @@ from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
 from pyomo_fesd.march.kind import Kind, State, active_at_first
-from pyomo_fesd.march.shares import Even, equal_lengths, wanted
+from pyomo_fesd.march.shares import Even, Passed, equal_lengths, wanted
 from pyomo_fesd.march.window import Window
 from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.records import records
@@ -59,7 +59,7 @@ class March:
         self._memories = [Memory([m for m in modes if m.system == s], self._block.component('memory')) for s in systems]
         self._jumps = Jumps(jumps, self._block.component('jumps'))
         self._reader = Reader(model, self._block, self._grid, self._times, self._given(inputs))
-        self._equations, self._kinds, self._state = {}, {}, State()
+        self._equations, self._kinds, self._state, self._passed = {}, {}, State(), {}
         self._time, self._events = float(wrt.first()), {}
 
     def _given(self, inputs):
@@ -98,7 +98,7 @@ class March:
 
     def _equalise(self):
         """March with equal lengths between switches until they fit; returns whether they do."""
-        equal, differs = equal_lengths(self._block, self._grid)
+        equal, differs = equal_lengths(self._block, self._grid, self._passed)
         for _ in range(PASSES):
             if differs <= EQUAL:
                 return True
@@ -107,7 +107,7 @@ class March:
                     return False
             except FesdError:
                 return False
-            before, (equal, differs) = equal, equal_lengths(self._block, self._grid)
+            before, (equal, differs) = equal, equal_lengths(self._block, self._grid, self._passed)
             if equal.last != before.last:
                 return False
         return differs <= NEARLY
@@ -154,6 +154,7 @@ class March:
             for left, element in zip(range(len(elements), 0, -1), elements):
                 share = shares.most(element, rest, left, len(self._events[stage]))
                 h, happened = self._advance(element, share, warm)
+                self._passed[element.n] = Passed(self._state.theta, bool(happened))
                 cut = h < share * (1 - CUT)
                 # after a switch another active set holds
                 warm = bool(happened) or not cut

@@ -9,6 +9,7 @@ Does not apply: to systems with freedom; inputs have to be given.
 """
 
 from pyomo.common.collections import ComponentMap
+from pyomo.common.gc_manager import PauseGC
 from pyomo.common.timing import HierarchicalTimer
 
 from pyomo_fesd.errors import FesdError
@@ -53,7 +54,7 @@ def simulate(model, wrt=None, inputs=(), timer=None, **options):
     ends = _fixed_later(model, wrt)
     timer = timer or HierarchicalTimer()
     try:
-        with phase(timer, 'simulate'):
+        with phase(timer, 'simulate'), PauseGC():
             with phase(timer, 'read'):
                 march = March(model, wrt, inputs, options, timer)
             with phase(timer, 'march'):

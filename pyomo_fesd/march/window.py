@@ -68,4 +68,3 @@ class Window:
     def put_out(self, equations):
         """Write what was found into the user's model."""
         put_out(equations, self.values)
-
