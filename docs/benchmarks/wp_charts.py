@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from wp_front import front, slope
-from wp_table import BIG_M, EVENTS, EXACT, FIXED, MARCH, NOSNOC, ORDERS, OURS, SMOOTH, STEPS, TIGHT, TIGHT_STEPS
+from wp_table import BIG_M, EVENTS, EXACT, FIXED, MARCH, NOSNOC, ORDERS, OURS, REFINE, SMOOTH, STEPS, TIGHT, TIGHT_STEPS
 
 
 class Curve(NamedTuple):
@@ -21,6 +21,7 @@ class Curve(NamedTuple):
 CURVES = {
     'pyomo_fesd': Curve((OURS,), 'C3', 'o'),
     'pyomo_fesd, simulate': Curve((MARCH,), 'C1', 'D'),
+    'pyomo_fesd, refine': Curve((REFINE,), 'C6', '*'),
     'nosnoc, defaults': Curve((NOSNOC, STEPS), 'C0', 's', '--'),
     'nosnoc, comp_tol=1e-12': Curve((TIGHT, TIGHT_STEPS), 'C9', '^', '-.'),
     'fixed grid': Curve((FIXED,), 'C2', 'v', ':'),
@@ -28,16 +29,16 @@ CURVES = {
     'big-M': Curve((BIG_M,), 'C5', 'P', ':'),
     'events by hand (scipy)': Curve((EVENTS,), '0.5', '.', '--'),
 }
-#: Of each problem the quantity that is drawn, and its name.
+#: What the worst error of each problem is made of.
 DRAWN = {
-    'signum': ('error', "error of x(2) and of the switch time"),
-    'tank': ('error', "error of the end state and of the switch time (relative)"),
-    'oscillator': ('error', "error of the end state and of the switch time"),
-    'sensitivity': ('error', "error of dx(2)/dx0 = 1/3"),
-    'tank control': ('error', "error of cost, control, end state, switch (relative)"),
-    'sliding-mode control': ('error', "error of the cost (relative)"),
-    'friction motor': ('error', "error of the cost (relative)"),
-    'cart-pole': ('error', "error of the cost (relative)"),
+    'signum': "error of x(2) and of the switch time",
+    'tank': "error of the end state and of the switch time (relative)",
+    'oscillator': "error of the end state and of the switch time",
+    'sensitivity': "error of dx(2)/dx0 = 1/3",
+    'tank control': "error of cost, control, end state, switch (relative)",
+    'sliding-mode control': "error of the cost (relative)",
+    'friction motor': "error of the cost (relative)",
+    'cart-pole': "error of the cost (relative)",
 }
 #: Least distance of two labels, in shares of the height.
 SPACING = 0.065
@@ -68,8 +69,8 @@ def draw_all(table, folder):
 
 def work_precision(axis, rows, curves):
     """Error against time: all runs as faint points, the front of each method as a line with its name."""
-    problem = rows['problem'].iloc[0]
-    ends = []
+    problem, ends = rows['problem'].iloc[0], []
+    axis.set(xscale='log', yscale='log', xlabel='time from model to solution (s)', ylabel=DRAWN[problem])
     for name, curve in curves.items():
         own = rows[rows['method'].isin(curve.methods)]
         times, errors = front(own)
@@ -79,7 +80,6 @@ def work_precision(axis, rows, curves):
         axis.plot(claimed['total'], claimed['error'].clip(lower=1e-15), curve.marker, color=curve.colour, ms=3, alpha=0.3)
         axis.plot(times, errors, curve.line, marker=curve.marker, color=curve.colour, ms=5, lw=1.4)
         ends.append((name, curve.colour, times[-1], errors[-1]))
-    axis.set(xscale='log', yscale='log', xlabel='time from model to solution (s)', ylabel=DRAWN[problem][1])
     axis.grid(alpha=0.3)
     _label(axis, ends)
 
