@@ -27,9 +27,10 @@ from pyomo_fesd.trajectory import physical_time
 
 logger = logging.getLogger('pyomo_fesd')
 
-#: A step shorter than this part of its share is none.
+#: Parts of an element's length, or of its share if that is longer: what is left of a stage after a switch may be as short as the
+#: solver's tolerances.  A step shorter than this is none.
 NO_STEP = 1e-9
-#: A step that is shorter than its share by more than this part has been cut short by an event.
+#: A step that is shorter than its share by more than this has been cut short by an event.
 CUT = 1e-7
 #: How an element is tried, one after the other: from where the last one ended; from afar; with other starts.  A step of no
 #: length is a local solution of its own where a switch lies on the left boundary, so the later ones look farther.
@@ -119,13 +120,14 @@ class March:
                 left, expected = len(elements) - number, max(0, reserve[stage] - len(self._events[stage]))
                 share = rest / max(1, left - expected)
                 h, happened = self._advance(element, share, warm)
-                cut = h < share * (1 - CUT)
+                least = CUT * max(share, element.length)
+                cut = h < share - least
                 # after a switch another active set holds
                 warm = bool(happened) or not cut
                 rest, self._time = rest - h, self._time + h
                 if cut or happened:
                     self._events[stage].append((self._time, ', '.join(happened) or 'switch'))
-                if (rest <= CUT * share) != (left == 1):
+                if (rest <= least) != (left == 1):
                     return stage
         for memory in self._memories:
             memory.settle(self._grid, self._wrt.first())
@@ -160,11 +162,12 @@ class March:
             refuse_freedom(equations)
             self._windows[equations.kind] = Window(equations, self._options), element.length
         window, nominal = self._windows[equations.kind]
+        longest = max(most, element.length)
         for options in TRIES[not warm :]:
             answer = window.solve(equations, most / nominal, **options)
             h = window.length * nominal
-            if answer.stationarity == 'B' and h > NO_STEP * most:
-                h = most if h > most * (1 - CUT) else h
+            if answer.stationarity == 'B' and h > NO_STEP * longest:
+                h = most if h > most - CUT * longest else h
                 window.put_out(equations)
                 self._block.r[element.n].set_value(h / element.length, skip_validation=True)
                 return h
