@@ -39,10 +39,10 @@ class Filippov:
         while t < T:
             events = self._events(mode)
             run = solve_ivp(
-                lambda _, x: np.array(self.f[mode](x)).ravel(),
+                lambda _, x, f=self.f[mode]: np.array(f(x)).ravel(),
                 (t, T),
                 x,
-                jac=lambda _, x: np.array(self.J[mode](x)),
+                jac=lambda _, x, J=self.J[mode]: np.array(J(x)),
                 events=events,
                 **EXACT,
             )
