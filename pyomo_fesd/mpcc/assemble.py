@@ -31,8 +31,9 @@ def assemble(problem, entries, nl, handles, factors):
 
     scale = Scale(s_x, s_g, s_f, _with_those_of_variables(s_sides, sides, layout, s_x))
     graph = ca.Function('mpcc', [w, p], _outputs(layout, f, own, stack, S, scale))
-    guide = [problem.artificial.get(v.parent_component(), (-np.inf, np.inf)) for v in variables]
-    source = Source(variables, handles.parameters, _are_sides(sides, layout), np.array(guide, dtype=float).reshape(-1, 2), s_x, entries.splits)
+    guides = [problem.artificial.get(v.parent_component(), (-np.inf, np.inf)) for v in variables]
+    guide = np.array(guides, dtype=float).reshape(-1, 2)
+    source = Source(variables, handles.parameters, _are_sides(sides, layout), guide, s_x, entries.splits)
     numbers = _numbers(problem, nl, layout, sides, scale, source, conditions, variables)
     return Compiled(graph, numbers, variables, constraints, conditions, problem.decisions, source)
 

@@ -143,6 +143,15 @@ class Compiled:
         self._numbers = replace(self._numbers, **self._source.read())
         self.__dict__.update(vars(self._numbers))
 
+    def narrow(self):
+        """Where bounds belong to the method, a branch has the lower ones of the homotopy, too."""
+        self.lbx = self.guide_lbx
+
+    def widen(self):
+        """Undo ``narrow``; returns whether that makes a difference."""
+        narrow, self.lbx = self.lbx, self._numbers.lbx
+        return bool((narrow > self.lbx).any())
+
     @property
     def nonzeros(self):
         """Entries of the Jacobians, by what they belong to."""

@@ -92,6 +92,8 @@ class Homotopy:
         step, options = self._ladder.pop(0), self._options
         self._steps.note(step.what, relaxed.w)
         self._gap.restart()
+        if step.other_form and self._c.widen() and self._branches is not None:
+            self._branches.forget()
         eps = max(step.eps(options.eps_init, stage.eps, options.eps_factor), options.eps_final)
         return _Stage((stage.form + step.other_form) % len(self._forms), step.start(self._start, relaxed.w, self), eps)
 
@@ -128,13 +130,17 @@ class Homotopy:
         return None not in (before, now) and max(before, now) - best <= same
 
     def _other_form(self, stage, relaxed):
-        """Where a path ends with nothing feasible the other form takes another one."""
-        if self._branches is None or self.run.point is not None or stage.form + 1 == len(self._forms):
+        """Where a path ends with nothing feasible: the same with wider bounds, then the other form."""
+        if self._branches is None or self.run.point is not None:
             return None
-        self._steps.note("nothing feasible on this path, other form", relaxed.w)
+        wider = self._c.widen()
+        form = stage.form + (not wider)
+        if form == len(self._forms):
+            return None
+        self._steps.note("nothing feasible on this path, " + ("shorter elements" if wider else "other form"), relaxed.w)
         self._gap.restart()
         self._branches.forget()
-        return _Stage(stage.form + 1, self._start, self._options.eps_init)
+        return _Stage(form, self._start, self._options.eps_init)
 
     def _certified(self):
         return self.run.point is not None and self.run.point.certificate.certified
