@@ -240,7 +240,7 @@ class March:
                 if 0 < b - a < least * (1 - CUT):
                     logger.warning(
                         "simulate: from time %.6g to %.6g there is less time between two switches than the least element length "
-                        "%.3g, so mpec_hybrid will not find this solution. Take more elements (nfe) or a larger length_bounds.",
+                        "%.3g, so mpec_hybrid will not find this solution. Take more elements (nfe).",
                         a,
                         b,
                         least,
