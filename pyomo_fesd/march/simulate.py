@@ -15,6 +15,7 @@ from pyomo.common.timing import HierarchicalTimer
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.indicators import set_indicators
 from pyomo_fesd.march.march import March
+from pyomo_fesd.march.timeless import solve_timeless
 from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.records import records
 from pyomo_fesd.review import review
@@ -51,6 +52,7 @@ def simulate(model, wrt=None, inputs=(), timer=None, **options):
     if wrt not in records(model).grids:
         raise FesdError(wrt, "simulate: its elements are not movable", "apply fesd.finite_elements first")
     inputs = list(inputs) if isinstance(inputs, (list, tuple)) else [inputs]
+    solve_timeless(model, wrt)
     ends = _fixed_later(model, wrt)
     timer = timer or HierarchicalTimer()
     try:
