@@ -129,7 +129,7 @@ def _varies(expr):
             if not all(map(is_potentially_variable, factors)):
                 return False
             waiting += factors
-        elif isinstance(node, WHOLE) or not node.is_expression_type():
+        elif isinstance(node, WHOLE) or not is_potentially_variable(node):
             return False
         else:
             waiting.append(next(filter(is_potentially_variable, node.args)))
