@@ -23,7 +23,7 @@ from pyomo_fesd.trajectory import jumps_that_happen, physical_time
 #: A function below this part of its largest value is zero all along an element.
 ZERO = 1e-7
 #: An excursion counts if it is larger than this part of the function's largest value in the element.
-EXCURSION = 1e-4
+EXCURSION = 1e-6
 #: Relative times at which a function is evaluated, and those between them at which its interpolant is.
 NODES = (1 - np.cos(np.pi * (np.arange(12) + 0.5) / 12)) / 2
 INSIDE = np.linspace(0.0, 1.0, 202)[1:-1]

@@ -6,7 +6,7 @@ A mark is a ``Suffix(direction=LOCAL)`` with one of the names below on the block
 =================  ========================  ===========================================================================
 mark               on                        value
 =================  ========================  ===========================================================================
-CONTINUOUS         Var                       the Constraint (of lam, mu, p, n), Complementarity (of a kink's s) or Expression (the
+CONTINUOUS         Var (or data)             the Constraint (of lam, mu, p, n), Complementarity (of a kink's s) or Expression (the
                                              arguments of the weights w) that ties it to the states: continuous in time where
                                              the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
@@ -24,8 +24,8 @@ TENTATIVE          Complementarity (data)    ``True``: one of those DECIDED that
 MOVE               Expression (data)         what changes together, as (component, value): of a pair, another pair whose zero side
                                              it may take over, or None if its first side may become zero; of a Var, where the move
                                              starts it, or ``True``: worth a look only where it is at its lower bound
-ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
-                                             certificate looks beyond them
+ARTIFICIAL         Var                       its bounds (low, high) in the homotopy; all its bounds are the method's, not the
+                                             plant's, and a certificate looks beyond them
 PENALTY            Expression                its weight rho; guides the homotopy, never part of the reported objective
 =================  ========================  ===========================================================================
 """

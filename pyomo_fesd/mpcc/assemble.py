@@ -30,7 +30,8 @@ def assemble(problem, entries, nl, handles, factors):
     s_sides = _factors_of_expressions(S, (w, p), (start * s_x, parameter_values(handles.parameters)), given)
 
     scale = Scale(s_x, s_g, s_f, _with_those_of_variables(s_sides, sides, layout, s_x))
-    guide = np.array([problem.artificial.get(v.parent_component(), np.inf) for v in variables], dtype=float)
+    guides = [problem.artificial.get(v.parent_component(), (-np.inf, np.inf)) for v in variables]
+    guide = np.array(guides, dtype=float).reshape(-1, 2)
     source = Source(variables, handles.parameters, _are_sides(sides, layout), guide, s_x, entries.splits)
     numbers = _numbers(problem, nl, layout, sides, scale, source, conditions, variables)
     outputs = _outputs(layout, f, own, stack, S, scale)

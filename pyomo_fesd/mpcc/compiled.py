@@ -36,7 +36,7 @@ class Numbers:
     lbg, ubg : arrays (m)
     side_of : int array (2q), equal numbers for equal sides among G (first q) and H
     artificial : bool array (n), variables whose bounds belong to the method
-    guide_ubx : array (n), upper bounds in the homotopy: those of such variables are tighter there
+    guide_lbx, guide_ubx : arrays (n), bounds in the homotopy: those of such variables are tighter there
     x0 : array (n), the model's values projected to the bounds
     parameters : array (l), values of the parameters that a new solve may change
     missing : int, number of variables without a value
@@ -53,6 +53,7 @@ class Numbers:
     ubg: np.ndarray
     side_of: np.ndarray
     artificial: np.ndarray
+    guide_lbx: np.ndarray
     guide_ubx: np.ndarray
     x0: np.ndarray
     parameters: np.ndarray
@@ -145,6 +146,15 @@ class Compiled:
         """Read bounds, start and parameters from the model again; see ``Source.read``."""
         self._numbers = replace(self._numbers, **self._source.read())
         self.__dict__.update(vars(self._numbers))
+
+    def narrow(self):
+        """Where bounds belong to the method, a branch has the lower ones of the homotopy, too."""
+        self.lbx = self.guide_lbx
+
+    def widen(self):
+        """Undo ``narrow``; returns whether that makes a difference."""
+        narrow, self.lbx = self.lbx, self._numbers.lbx
+        return bool((narrow > self.lbx).any())
 
     @property
     def nonzeros(self):

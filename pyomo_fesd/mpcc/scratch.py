@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pyomo.common.collections import ComponentMap
 from pyomo.common.modeling import unique_component_name
 from pyomo.common.numeric_types import native_numeric_types
-from pyomo.core import Block, ConstraintList, Objective, Suffix, VarList, quicksum, value
+from pyomo.core import Block, ConstraintList, Objective, VarList, quicksum, value
 from pyomo.core.expr import Expr_ifExpression, PowExpression, ProductExpression
 from pyomo.core.expr.numvalue import is_potentially_variable
 from pyomo.repn import generate_standard_repn
@@ -50,16 +50,14 @@ class Entries:
 
 @contextmanager
 def entries_of(problem, handles):
-    """The ``Entries`` of ``problem`` on a scratch block; its pairs and the exported suffixes sleep while it exists."""
+    """The ``Entries`` of ``problem`` on a scratch block; its pairs sleep while it exists."""
     model, scratch = problem.model, Block()
     model.add_component(unique_component_name(model, '_pyomo_fesd_scratch'), scratch)
-    pairs, suffixes = _sleep(problem.sources), _sleep_suffixes(model)
+    pairs = _sleep(problem.sources)
     try:
         yield _entries(scratch, problem, handles)
     finally:
         model.del_component(scratch)
-        for suffix in suffixes:
-            suffix.activate()
         _wake(pairs)
 
 
@@ -158,11 +156,3 @@ def _wake(components):
         component._active = True
         for data in datas:
             data.activate()
-
-
-def _sleep_suffixes(model):
-    """Deactivate the suffixes that the NL writer would export; returns them."""
-    suffixes = [s for s in model.component_objects(Suffix, active=True, descend_into=Block) if s.export_enabled()]
-    for suffix in suffixes:
-        suffix.deactivate()
-    return suffixes
