@@ -139,7 +139,7 @@ class FiniteElements(Transformation):
         ConfigValue(
             default=0.9,
             domain=_gamma,
-            description="gamma of eq. (10): |h_n - hbar_n| <= gamma hbar_n in the homotopy; the branch keeps the lower bound only",
+            description="gamma of eq. (10): |h_n - hbar_n| <= gamma hbar_n in the homotopy; a branch has shorter and longer ones",
         ),
     )
     CONFIG.declare(

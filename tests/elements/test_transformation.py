@@ -195,7 +195,7 @@ def test_a_keyword_that_cannot_be_meant_is_refused(keywords):
     assert seen(m) == before
 
 
-def test_no_element_becomes_shorter_than_length_bounds_say():
+def test_no_element_becomes_shorter_than_length_bounds_say_where_that_will_do():
     m = run(signum.build(), nfe=10, length_bounds=0.5)
     assert min(lengths(m)) >= 0.5 * 0.2 - 1e-9
     assert switch_time(m) == pytest.approx(2 / 3, abs=1e-9)

@@ -79,9 +79,9 @@ def test_a_failed_relaxation_climbs_the_ladder_from_its_first_step():
     assert notes[len(LADDER) : len(LADDER) + 2] == ['search over the pairs', 'start elsewhere']
 
 
-@pytest.mark.parametrize(('build', 'first'), [(small_mpccs.bard1, 'scholtes'), (mpcc_collection.no_objective, 'elastic')])
-def test_auto_begins_with_the_form_that_suits_the_objective(build, first):
-    paths = [relaxations(run(model_of(build), relaxation=form)) for form in ('auto', first)]
+@pytest.mark.parametrize('build', [small_mpccs.bard1, mpcc_collection.no_objective])
+def test_auto_begins_with_the_elastic_form(build):
+    paths = [relaxations(run(model_of(build), relaxation=form)) for form in ('auto', 'elastic')]
     assert [(s.eps, s.iterations) for s in paths[0]] == [(s.eps, s.iterations) for s in paths[1]]
 
 
