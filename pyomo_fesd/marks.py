@@ -6,7 +6,7 @@ A mark is a ``Suffix(direction=LOCAL)`` with one of the names below on the block
 =================  ========================  ===========================================================================
 mark               on                        value
 =================  ========================  ===========================================================================
-CONTINUOUS         Var                       the Constraint (of lam, mu, p, n), Complementarity (of a kink's s) or Expression (the
+CONTINUOUS         Var (or data)             the Constraint (of lam, mu, p, n), Complementarity (of a kink's s) or Expression (the
                                              arguments of the weights w) that ties it to the states: continuous in time where
                                              the quantity that switches is
 SELECTOR           Var                       ``True``: an independent multiplier nu, free to jump at a switch
@@ -21,11 +21,11 @@ GUARD              Expression (data)         ``True``: a jump of the state happe
 RESET              Var (data)                the Expression of the value after the jump whose guard stands on the same block
 DECIDED            Complementarity (data)    the inactive Constraint to impose where the pair's second side is positive
 TENTATIVE          Complementarity (data)    ``True``: one of those DECIDED that is dropped where it leaves no solution
-MOVE               Complementarity (data)    another pair whose zero side it may take over, or None if its first side may become
-                                             zero; all on one block do so together
-                   Var (data)                where the move starts it; ``True``: worth a look only where it is at its lower bound
-ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
-                                             certificate looks beyond them
+MOVE               Expression (data)         what changes together, as (component, value): of a pair, another pair whose zero side
+                                             it may take over, or None if its first side may become zero; of a Var, where the move
+                                             starts it, or ``True``: worth a look only where it is at its lower bound
+ARTIFICIAL         Var                       its bounds (low, high) in the homotopy; all its bounds are the method's, not the
+                                             plant's, and a certificate looks beyond them
 PENALTY            Expression                its weight rho; guides the homotopy, never part of the reported objective
 =================  ========================  ===========================================================================
 """
@@ -86,6 +86,8 @@ def use_up(block, name, wrt):
 def is_generated(component):
     """Whether ``component`` is, or lies in, a block that one of the transformations made."""
     while component is not None:
+        # a name with an index takes time to write
+        component = component.parent_component()
         if component.local_name.startswith(GENERATED):
             return True
         component = component.parent_block()

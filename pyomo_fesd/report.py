@@ -1,5 +1,7 @@
 """The size of a model: what is in it, and what was left out."""
 
+from collections import Counter
+
 import pandas as pd
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint, Objective
@@ -21,11 +23,19 @@ class Report(dict):
     __str__ = __repr__
 
 
-def report(model):
+def report(model, blocks=False):
     """Count what the solver will see.
+
+    Parameters
+    ----------
+    blocks : bool
+        also count each block that stands on ``model``, e.g. the units of a flowsheet
 
     Returns
     -------
+    pandas.DataFrame
+        with ``blocks``: a row for each of them and the last for all; a variable that stands in equations of two blocks counts in
+        both
     Report
         a dict: ``variables`` and ``constraints`` (active, as the solver counts them; multipliers among them in
         ``multipliers``), ``pairs`` (complementarity pairs in the homotopy), ``decided`` (pairs that only the branch decides,
@@ -33,6 +43,11 @@ def report(model):
         conditions over time that the pairs stand for; one between two bounds counts twice), ``disjunctions`` (transformed) and
         ``modes left out`` (switched-off disjuncts, which leave no multiplier)
     """
+    if blocks:
+        children = [b for b in model.component_objects(Block, descend_into=False) if b.active]
+        rows = {b.local_name: _sum(report(data) for data in b.values() if data.active) for b in children}
+        rows = {name: row for name, row in rows.items() if any(row.values())}
+        return pd.DataFrame.from_dict(rows | {'all': report(model)}, orient='index')
     constraints = list(model.component_data_objects(Constraint, active=True, descend_into=Block))
     conditions = list(model.component_data_objects(Complementarity, active=True, descend_into=Block))
     deciding = ComponentMap(marks.marked(model, marks.DECIDED))
@@ -59,6 +74,14 @@ def report(model):
             'modes left out': sum(1 for d in disjunctions for mode in d.disjuncts if mode.transformation_block is None),
         }
     )
+
+
+def _sum(reports):
+    """Counts of all data of an indexed block; what two of them share counts in both."""
+    total = Counter()
+    for counts in reports:
+        total.update(counts)
+    return dict(total)
 
 
 def _transformed(disjunction):

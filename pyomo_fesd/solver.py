@@ -33,6 +33,7 @@ from pyomo_fesd.mpcc.source import Contradiction
 from pyomo_fesd.mpcc.stationarity import certify as certify_point
 from pyomo_fesd.mpcc.table import StartsTable, Table, log_streams
 from pyomo_fesd.review import review
+from pyomo_fesd.structure import structure
 
 
 @document_class_CONFIG(methods=['solve'])
@@ -128,6 +129,7 @@ class MpecHybrid(SolverBase):
                 solver = algorithm(compiled, config, config.timer, table.row, instance.deadline, after, instance.built)
                 record.run = solver.run
                 fill(results, model, solver.solve(), compiled)
+                _explain(results, model)
             results.timing_info.wall_time = time.perf_counter() - started
             table.end(results)
         return self._deliver(results, config, model)
@@ -171,6 +173,13 @@ class MpecHybrid(SolverBase):
             feasible = results.solution_status in (SolutionStatus.optimal, SolutionStatus.feasible)
             results.extra_info.warnings = review(model) if feasible else []
         return results
+
+
+def _explain(results, model):
+    """Where nothing feasible was found: whether there is an equation for every unknown."""
+    if results.solution_status is SolutionStatus.infeasible:
+        info = results.extra_info
+        info.reason = '; '.join(part for part in (info.reason, structure(model).problem) if part)
 
 
 class LegacyMpecHybrid(LegacySolverWrapper, MpecHybrid):

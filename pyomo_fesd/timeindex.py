@@ -2,8 +2,9 @@
 
 from collections import defaultdict
 
-from pyomo.common.collections import ComponentMap
-from pyomo.core import Block
+from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.core import Block, Constraint, Var
+from pyomo.core.base.block import BlockData
 from pyomo.dae import ContinuousSet, DerivativeVar
 from pyomo.gdp import Disjunct
 
@@ -108,15 +109,28 @@ def strip_time(name):
 
 
 def refuse_foreign(variables, model, where):
-    """Refuse variables of another model: a rule that closes over ``m`` still means ``m`` when a clone of it is expanded."""
-    for component in ComponentMap((v.parent_component(), v) for v in variables):
-        if component.model() is not model:
+    """Refuse variables of another model: a rule that closes over ``m`` still means ``m`` when a clone of it is expanded.
+
+    A temporary block that holds another model's blocks or constraints, as initialisers make them, holds its variables as well.
+    """
+    foreign = [c for c in ComponentMap((v.parent_component(), v) for v in variables) if c.model() is not model]
+    held = _models_held(where) if foreign else ()
+    for component in foreign:
+        if not any(component.model() is other for other in held):
             raise FesdError(
                 where,
                 f"it refers to '{component.name}' of another model (of which this one is perhaps a clone)",
                 "let rules take components from their own argument, e.g. d.model().x[t] instead of m.x[t], or transform before "
                 "cloning",
             )
+
+
+def _models_held(block):
+    """The models that the blocks and constraints in ``block`` belong to."""
+    held = ComponentSet()
+    if isinstance(block, BlockData):
+        held.update(c.model() for c in block.component_data_objects((Block, Constraint), descend_into=Block))
+    return held
 
 
 def find_continuous_set(block, wrt, caller):
@@ -157,7 +171,7 @@ def find_continuous_set(block, wrt, caller):
 
 def derivatives(block, wrt):
     """Every DerivativeVar with respect to ``wrt`` below ``block``, also after discretisation made it a plain Var."""
-    for var in block.component_objects(descend_into=(Block, Disjunct)):
+    for var in block.component_objects((Var, DerivativeVar), descend_into=(Block, Disjunct)):
         if isinstance(var, DerivativeVar) and any(s is wrt for s in var.get_continuousset_list()):
             yield var
 

@@ -127,7 +127,7 @@ def _blend(block, index, system, weight):
     equations = system.equations
     copies = [_copies(block, index, system, i) if None in f else f for i, f in enumerate(equations.rhs)]
     for j, v in enumerate(equations.defined):
-        alike = [(modes, copies[modes[0]][j]) for modes in equations.alike(j)]
+        alike = [(modes, copies[modes[0]][j]) for modes in equations.alike[j]]
         if len(alike) == 1:
             expr = alike[0][1]
         else:

@@ -5,9 +5,9 @@ for the variables that all modes define: the derivatives that appear, then the a
 solvable in every mode.  Where a variable cannot be isolated with a constant factor, the mode gets its own copy of it.
 """
 
-import itertools
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain, combinations
 from math import comb
 
 import numpy as np
@@ -19,6 +19,7 @@ from pyomo.repn import generate_standard_repn
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
+from pyomo_fesd.dcs.shape import Swap
 from pyomo_fesd.errors import FesdError
 
 #: With more ways than this to choose the defined variables, only those that stand alone on a side are considered.
@@ -39,23 +40,38 @@ class ModeEquations:
         the equations of each mode, as the user wrote them
     used : list of lists of lists of ConstraintData
         ``used[i][j]``: the equations of mode i that define v_j
+    alike : list of lists of lists of int
+        ``alike[j]``: the modes by number, those together that give v_j the same right-hand side
     """
 
     defined: list
     rhs: list
     equations: list
     used: list
+    alike: list
 
-    def alike(self, j):
-        """The modes by number, those together that give v_j the same right-hand side."""
-        groups = []
-        for i, f in enumerate(self.rhs):
-            group = next((g for g in groups if f[j] is not None and _same(self.rhs[g[0]][j], f[j])), None)
-            if group is None:
-                groups.append([i])
-            else:
-                group.append(i)
-        return groups
+    def swapped(self, swap, equations):
+        """The same for other variables, by a ``Swap``, and the ``equations`` that contain these."""
+        others = Swap(chain(*self.equations), chain(*equations))
+        return ModeEquations(
+            [swap[v] for v in self.defined],
+            [[f if f is None else swap.expression(f) for f in row] for row in self.rhs],
+            equations,
+            [[[others[con] for con in cons] for cons in row] for row in self.used],
+            self.alike,
+        )
+
+
+def _alike(rhs, j):
+    """The modes by number, those together that give v_j the same right-hand side."""
+    groups = []
+    for i, f in enumerate(rhs):
+        group = next((g for g in groups if f[j] is not None and _same(rhs[g[0]][j], f[j])), None)
+        if group is None:
+            groups.append([i])
+        else:
+            group.append(i)
+    return groups
 
 
 def _same(a, b):
@@ -99,7 +115,7 @@ def read_equations(disjunction, disjuncts, equalities, is_derivative, is_state, 
     wanted = _derivatives(disjunction, disjuncts, modes, is_derivative)
     defined = wanted + _algebraic(disjunction, modes, wanted, is_state, cache)
     rhs, used = zip(*(_solve(equations, defined) for equations in modes))
-    return ModeEquations(defined, list(rhs), equalities, list(used))
+    return ModeEquations(defined, list(rhs), equalities, list(used), [_alike(rhs, j) for j in range(len(defined))])
 
 
 @contextmanager
@@ -164,7 +180,7 @@ def _derivatives(disjunction, disjuncts, modes, is_derivative):
     found = ComponentMap()
     for equations in modes:
         for e in equations:
-            for v in itertools.chain(e.linear, e.nonlinear):
+            for v in chain(e.linear, e.nonlinear):
                 if is_derivative(v):
                     found[v] = None
     for disjunct, equations in zip(disjuncts, modes):
@@ -196,7 +212,7 @@ def _algebraic(disjunction, modes, derivatives, is_state, cache):
     considered = candidates
     if comb(len(candidates), number) > MOST_CHOICES:
         considered = [v for v in candidates if any(v in e.alone for eqs in modes for e in eqs)]
-    choices = list(itertools.combinations(considered, number))
+    choices = list(combinations(considered, number))
     for fits in (_solvable, _matching):
         group = [c for c in choices if all(fits(eqs, [*derivatives, *c]) for eqs in modes)]
         if group:
@@ -215,7 +231,7 @@ def _algebraic(disjunction, modes, derivatives, is_state, cache):
 def _candidates(modes, derivatives, is_state):
     """Algebraic variables that every mode mentions, in order of appearance."""
     known = ComponentSet(derivatives)
-    mentioned = [ComponentSet(v for e in eqs for v in itertools.chain(e.linear, e.nonlinear)) for eqs in modes]
+    mentioned = [ComponentSet(v for e in eqs for v in chain(e.linear, e.nonlinear)) for eqs in modes]
     return [v for v in mentioned[0] if v not in known and not is_state(v) and all(v in others for others in mentioned[1:])]
 
 

@@ -1,9 +1,10 @@
 """One Disjunction at one time, as read: its modes, its regions and what the modes define."""
 
 from dataclasses import dataclass
+from itertools import chain
 
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, LogicalConstraint, Var
+from pyomo.core import Block, LogicalConstraint
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import DerivativeVar
 from pyomo.gdp import Disjunct
@@ -12,6 +13,7 @@ from pyomo.mpec import Complementarity
 from pyomo_fesd.dcs.modes import ModeEquations, read_equations
 from pyomo_fesd.dcs.nested import Tree
 from pyomo_fesd.dcs.regions import Regions, read_regions
+from pyomo_fesd.dcs.shape import Swap, shape
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import refuse_foreign
 
@@ -42,10 +44,14 @@ class System:
         return self.tree.disjunction
 
 
-#: What a disjunct over time cannot contain, and what to do about it.
+#: What a disjunct over time cannot contain, a Disjunct only if it is another's, and what to do about it.
 REFUSED_INSIDE = {
-    LogicalConstraint: ("contains a LogicalConstraint", "state the mode by its region and its equations only"),
-    Complementarity: ("contains a Complementarity", "declare it outside the disjuncts, over time"),
+    Disjunct: (
+        "contains the Disjunct '{}', which belongs to no active Disjunction at the same time",
+        "write a Disjunction of the inner disjuncts, or deactivate it",
+    ),
+    LogicalConstraint: ("contains a LogicalConstraint, '{}'", "state the mode by its region and its equations only"),
+    Complementarity: ("contains a Complementarity, '{}'", "declare it outside the disjuncts, over time"),
 }
 
 
@@ -66,6 +72,7 @@ class Reader:
         self._times = times
         self._patterns = {}
         self._choices = {}
+        self._read, self._own = {}, ComponentSet()
 
     def is_derivative(self, v):
         """Whether ``v`` is data of a derivative with respect to time."""
@@ -77,51 +84,61 @@ class Reader:
 
     def read(self, tree, modes):
         """Read the ``modes`` that are left of a tree into a ``System``; the model is not changed."""
+        self._refuse_all_contents(tree, modes)
         if len(modes) == 1:
-            self._refuse_all_contents(tree, modes)
             return System(tree, modes, None, None)
-        equations, inequalities = self.contents(tree, modes)
-        patterns = self._patterns.setdefault(self._times.split(tree.disjunction)[1], {})
-        regions = read_regions(tree.disjunction, modes, inequalities, patterns)
-        refuse_defined_in_regions(tree.disjunction, regions.functions, equations)
-        return System(tree, modes, regions, equations)
+        split = [_constraints(mode) for mode in modes]
+        counts = tuple((len(equalities), len(inequalities)) for equalities, inequalities in split)
+        key, parts = shape([con.expr for con in chain(*chain(*split))], self._kind)
+        self._refuse_foreign(tree, modes, split, parts)
+        known = None if key is None else self._read.get((counts, key))
+        if known is not None:
+            first, places = known
+            return System(tree, modes, *_swapped(first, Swap(places, parts), split))
+        system = System(tree, modes, *self._study(tree.disjunction, modes, split))
+        if key is not None:
+            self._read[counts, key] = system, parts
+        return system
 
     def contents(self, tree, modes):
         """What two or more modes define (``ModeEquations``), and the inequalities of each."""
-        disjunction = tree.disjunction
         self._refuse_all_contents(tree, modes)
         split = [_constraints(mode) for mode in modes]
-        for mode, (equalities, inequalities) in zip(modes, split):
-            mentioned = (v for c in (*equalities, *inequalities) for v in identify_variables(c.body))
-            refuse_foreign(mentioned, disjunction.model(), mode)
+        self._refuse_foreign(tree, modes, split)
+        return self._equations(tree.disjunction, modes, split), [inequalities for _, inequalities in split]
+
+    def _kind(self, v):
+        """What matters of a variable for what is read."""
+        return self.is_derivative(v), self.is_state(v)
+
+    def _study(self, disjunction, modes, split):
+        """Regions and equations of a Disjunction of a new shape."""
+        equations = self._equations(disjunction, modes, split)
+        patterns = self._patterns.setdefault(self._times.split(disjunction)[1], {})
+        regions = read_regions(disjunction, modes, [inequalities for _, inequalities in split], patterns)
+        refuse_defined_in_regions(disjunction, regions.functions, equations)
+        return regions, equations
+
+    def _equations(self, disjunction, modes, split):
         self._refuse_derivatives_in_regions(split)
         choice = self._choices.setdefault(self._times.split(disjunction)[1], {})
-        equalities, inequalities = ([part[k] for part in split] for k in (0, 1))
-        equations = read_equations(disjunction, modes, equalities, self.is_derivative, self.is_state, choice)
-        return equations, inequalities
+        equalities = [equalities for equalities, _ in split]
+        return read_equations(disjunction, modes, equalities, self.is_derivative, self.is_state, choice)
+
+    def _refuse_foreign(self, tree, modes, split, parts=None):
+        """Refuse variables of another model; ``parts`` are all that there are, if they are known."""
+        homes = parts and ComponentSet(part.parent_component() for part in parts)
+        if homes and all(home in self._own for home in homes):
+            return
+        for mode, constraints in zip(modes, split):
+            mentioned = (v for c in chain(*constraints) for v in identify_variables(c.body))
+            refuse_foreign(mentioned, tree.disjunction.model(), mode)
+        self._own.update(homes or ())
 
     def _refuse_all_contents(self, tree, modes):
         known = ComponentSet(tree.disjuncts())
         for disjunct in ComponentSet(d for mode in modes for d in mode.disjuncts):
-            self._refuse_contents(disjunct, known)
-
-    @staticmethod
-    def _refuse_contents(disjunct, known):
-        for inside in disjunct.component_data_objects(Disjunct, active=True, descend_into=Block):
-            if inside not in known:
-                raise FesdError(
-                    disjunct,
-                    f"contains the Disjunct '{inside.name}', which belongs to no active Disjunction at the same time",
-                    "write a Disjunction of the inner disjuncts, or deactivate it",
-                )
-        for ctype, (cause, fix) in REFUSED_INSIDE.items():
-            inside = next(disjunct.component_data_objects(ctype, active=True, descend_into=Block), None)
-            if inside is not None:
-                raise FesdError(disjunct, f"{cause}, '{inside.name}'", fix)
-        for ctype in (Var, DerivativeVar):
-            for var in disjunct.component_objects(ctype, descend_into=Block):
-                if isinstance(var, DerivativeVar):
-                    raise FesdError(var, "a DerivativeVar inside a disjunct", "declare it on the block that holds its state")
+            _refuse_contents(disjunct, known)
 
     def _refuse_derivatives_in_regions(self, split):
         for _, inequalities in split:
@@ -133,6 +150,24 @@ class Reader:
                             f"the region condition contains the derivative '{v.name}'",
                             "say where a mode holds by the states; a rate that decides makes the modes depend on themselves",
                         )
+
+
+def _swapped(system, swap, split):
+    """Regions and equations of ``system`` with other variables; ``split`` are the constraints that contain them."""
+    regions = Regions([swap.expression(c) for c in system.regions.functions], system.regions.geometry)
+    return regions, system.equations.swapped(swap, [equalities for equalities, _ in split])
+
+
+def _refuse_contents(disjunct, known):
+    """Refuse a disjunct that contains what no mode can; ``known`` are the disjuncts of the same tree."""
+    for component in disjunct.component_objects(descend_into=Block):
+        if isinstance(component, DerivativeVar):
+            raise FesdError(component, "a DerivativeVar inside a disjunct", "declare it on the block that holds its state")
+        if component.ctype in REFUSED_INSIDE and component.active:
+            cause, fix = REFUSED_INSIDE[component.ctype]
+            for inside in component.values():
+                if inside.active and inside not in known:
+                    raise FesdError(disjunct, cause.format(inside.name), fix)
 
 
 def refuse_defined_in_regions(disjunction, functions, equations):

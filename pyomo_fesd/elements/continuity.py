@@ -139,7 +139,8 @@ def read_continuity(model, times, labels, held, told, trace):
     rules = ComponentMap(marks.marked(model, marks.CONTINUOUS))
     trace = trace or any(r.ctype is not Constraint for r in rules.values())
     equations = Equations(model, times, labels, rules) if trace else None
-    start, held = [*(d.get_state_var() for d in derivatives(model, times.wrt)), *each(told)], each(held)
+    states = (d.get_state_var() for d in derivatives(model, times.wrt))
+    start, held = each([*states, *told]), each(held)
     inside = _closure(Known(_is_fixed, start, held), rules, equations)
 
     def keeps_value(v):

@@ -53,7 +53,8 @@ class Equations:
             self._rows += list(self._function(component, rule))
 
     def _data(self, component):
-        return (d for d in component.values() if self._times.time(d) in self._labels)
+        among = component.values() if hasattr(component, 'values') else [component]
+        return (d for d in among if self._times.time(d) in self._labels)
 
     def mentioning(self, rule, test):
         """The indices at which a Constraint contains a variable for which ``test`` is true."""
@@ -70,8 +71,7 @@ class Equations:
                 same = self._times.time(v)
                 arguments = [e.expr for e in rule.values() if e.expr is not None and self._times.time(e) == same]
             else:
-                # pyomo.dae gives a Var all its indices, also those without a condition
-                arguments = [side(a).body for a in rule[v.index()]._args] if v.index() in rule else []
+                arguments = [side(a).body for a in _sides(rule, v)]
             if arguments:
                 found = ComponentSet([v, *(u for e in arguments for u in variables_of(e))])
                 yield arguments[-1], [u for u in found if self._times.time(u) is not None]
@@ -116,13 +116,23 @@ class Equations:
         """What defines one variable: a mark's rule, or the equation that is matched with it."""
         rule = rule_of(v, rules)
         if rule is not None and rule.ctype is Complementarity:
-            return [side(a).body for a in rule[v.index()]._args]
+            return [side(a).body for a in _sides(rule, v)]
         if rule is not None and rule.ctype is Expression:
             same = self._times.time(v)
             return [e.expr for e in rule.values() if e.expr is not None and self._times.time(e) == same]
         if rule is not None:
             return [c.body for c in self._data(rule) if any(u is v for u in identify_variables(c.body))]
         return [self._rows[row_of[columns[v]]][0]] if v in columns and row_of[columns[v]] >= 0 else []
+
+
+def _sides(rule, v):
+    """The two sides of the condition that a Complementarity states for a variable.
+
+    One condition may be marked for a variable of the user's that has other indices; pyomo.dae gives a Var all its indices, also
+    those without a condition.
+    """
+    data = rule if not rule.is_indexed() else rule[v.index()] if v.index() in rule else None
+    return [] if data is None else data._args
 
 
 def _is_model(constraint, apart):

@@ -11,13 +11,14 @@ its left boundary (too early an exit has H' < 0; too late a one, which only Gaus
 something else enforces has H' > 0, and G stays positive.
 
 Takes: the families of ``cross`` with one continuous side, ``theta`` of step equilibration.
-Leaves: ``arrival`` (inactive), ``exit`` (Complementarities), decided by the branch like equal lengths, and dropped where they leave
+Leaves: ``slope`` and ``below`` (positive where H has no slope, where G ends below zero), ``arrival`` (inactive), ``exit``
+(Complementarities), decided by the branch like equal lengths, and dropped where they leave
 no solution.
 Does not apply: with one stage, whose polynomial has no slope to tell; at boundaries of control stages.
 """
 
 import numpy as np
-from pyomo.core import Constraint, quicksum
+from pyomo.core import Constraint, Expression, quicksum
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
@@ -33,6 +34,9 @@ def add_exits(block, families, grid):
         return
     slope, end = _derivative_at_zero(grid.tau), _value_at_one(grid.tau)
     block.arrival = Constraint(block.family, block.element)
+    # by name, so that a solver's file says them once
+    block.slope = Expression(block.family, block.element)
+    block.below = Expression(block.family, block.element)
     block.exit = Complementarity(block.family, block.element)
     inner = [(e, f) for elements in grid.stages.values() for e, f in zip(elements, elements[1:])]
     for family in families:
@@ -48,7 +52,12 @@ def _add(block, family, e, f, slope, end):
     stages = [family.sides[t][0] for t in e.points]
     G = quicksum(weight * value for weight, value in zip(end, stages) if weight)
     H = [family.starts.get(f.n, family.sides[f.left])[1], *(family.sides[t][1] for t in f.points)]
-    flat = _positive(1 - _relative(slope, H) / FLAT) + _positive(-_relative(end, stages) / FLAT)
+    block.slope[family.name, e.n] = 1 - _relative(slope, H) / FLAT
+    flat = _positive(block.slope[family.name, e.n])
+    if min(end) < 0:
+        # with Radau the last stage is the end, and its value not negative
+        block.below[family.name, e.n] = -_relative(end, stages) / FLAT
+        flat += _positive(block.below[family.name, e.n])
     leaves = block.theta[family.name, e.n] * (1 - block.theta[family.name, f.n])
     block.arrival.add((family.name, e.n), G == 0)
     pair = block.exit.add((family.name, e.n), complements(G**2 >= 0, leaves * flat >= 0))

@@ -2,6 +2,7 @@
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class Grid:
         """Whether c_K = 1 (Radau): the right boundary is itself a stage point."""
         return self.tau[-1] == 1
 
-    @property
+    @cached_property
     def stages(self):
         """The elements of each control stage, as ``{stage: [elements]}``."""
         found = {}
@@ -104,8 +105,8 @@ def read_grid(wrt, stages):
         )
     tau = tuple(float(c) for c in info.get('tau_points', (0.0, 1.0)) if c > 0)
     tau = (*tau[:-1], 1.0) if abs(tau[-1] - 1) < 1e-12 else tau
-    boundaries, points = list(wrt.get_finite_elements()), list(wrt)
-    stray = [s for s in stages if s not in boundaries]
+    boundaries, points, opening = list(wrt.get_finite_elements()), list(wrt), set(stages)
+    stray = sorted(opening.difference(boundaries))
     if stray:
         raise FesdError(wrt, f"the stage boundaries {stray} are not element boundaries", "discretise with these points in the set")
     elements = []
@@ -119,7 +120,7 @@ def read_grid(wrt, stages):
                 f"its labels collide at pyomo.dae's resolution of {LABEL_RESOLUTION}",
                 "scale time, e.g. write the model in milliseconds or over a horizon of length 1",
             )
-        elements.append(Element(n, bisect_right(stages, left), left in stages, left, right, labels))
+        elements.append(Element(n, bisect_right(stages, left), left in opening, left, right, labels))
     return Grid(tuple(elements), tau, _quadrature(tau))
 
 

@@ -7,43 +7,40 @@ length.  At each inner boundary there are two moves: the element after it takes 
 other way round; inside a stage only where that element has its least length.
 
 Takes: the pairs of ``cross``, ``memory`` and ``jumps``.
-Leaves: ``move`` (a Block for each move) with the mark MOVE, by which ``mpec_hybrid`` looks at these branches too.
+Leaves: ``move`` (the length of the element that changes) with the mark MOVE, by which ``mpec_hybrid`` looks at these branches too.
 Does not apply: to a single element.
 """
 
 from collections import defaultdict
 
-from pyomo.core import Block
+from pyomo.core import Expression
 
 from pyomo_fesd import marks
 
 
 def add_moves(block, families, modes, jumps, grid):
     """Add the two moves of every inner boundary."""
-    block.move = Block(range(1, len(grid.elements)), [-1, 1])
+    # an Expression bears the mark: with a Block for each move every walk over the model would take longer
+    block.move = Expression(range(1, len(grid.elements)), [-1, 1])
     places = {names: _by_number(block, names) for names in (*ELEMENTS, *BOUNDARIES)}
-    opens = {e.n for e in grid.elements if e.opens_stage}
+    by_number = {e.n: e for e in grid.elements}
     for b in range(1, len(grid.elements)):
         for step in (-1, 1):
             # the element beside the boundary that changes; the switch itself goes from b to b + step
-            changed = b + 1 if step > 0 else b
-            home = block.move[b, step]
-            if b + 1 not in opens:
-                marks.mark(home, marks.MOVE, block.r[changed])
-            else:
-                _start_short(home, block, grid, changed)
-            for target, source in _pairs(places, changed, b, step):
-                marks.mark(home, marks.MOVE, target, source)
+            changed = by_number[b + 1 if step > 0 else b]
+            block.move[b, step] = block.r[changed.n]
+            short = _start_short(block, grid, changed) if by_number[b + 1].opens_stage else [(block.r[changed.n], True)]
+            marks.mark(block, marks.MOVE, block.move[b, step], (*short, *_pairs(places, changed.n, b, step)))
 
 
-def _start_short(home, block, grid, changed):
+def _start_short(block, grid, changed):
     """The element that takes over starts with its least length; the others of its stage share the rest."""
-    stage = next(elements for elements in grid.stages.values() if any(e.n == changed for e in elements))
-    total = stage[-1].right - stage[0].left
-    for e in stage if len(stage) > 1 else ():
-        least = block.r[e.n].lb if e.n == changed else None
-        rest = next(f.length * block.r[f.n].lb for f in stage if f.n == changed)
-        marks.mark(home, marks.MOVE, block.r[e.n], least if least is not None else (total - rest) / (len(stage) - 1) / e.length)
+    stage = grid.stages[changed.stage]
+    if len(stage) == 1:
+        return []
+    least = block.r[changed.n].lb
+    share = (stage[-1].right - stage[0].left - changed.length * least) / (len(stage) - 1)
+    return [(block.r[e.n], least if e is changed else share / e.length) for e in stage]
 
 
 #: Pairs of elements and pairs of boundaries, by the block below that of the grid that holds them.

@@ -1,6 +1,7 @@
 """``fesd.finite_elements``: collocation on elements whose boundaries find the switches."""
 
 from pyomo.common.config import ConfigDict, ConfigValue, In, NonNegativeFloat, PositiveInt, document_class_CONFIG
+from pyomo.common.gc_manager import PauseGC
 from pyomo.common.modeling import unique_component_name
 from pyomo.core import Block, Transformation, TransformationFactory
 from pyomo.gdp import Disjunction
@@ -30,6 +31,7 @@ from pyomo_fesd.elements.moves import add_moves
 from pyomo_fesd.elements.quadrature import integrals, integrand, rebuild
 from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.elements.right_limits import RightLimits
+from pyomo_fesd.elements.space import refuse_waiting_space
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.timeindex import TimeIndex, discretised, find_continuous_set
 
@@ -54,6 +56,14 @@ def _components(arg):
 def _lengths(arg):
     """Vars in the order of the stages, from a list or an indexed Var."""
     return None if arg is None else list(arg.values() if hasattr(arg, 'values') else arg)
+
+
+def _holder(block, wrt):
+    """``block``, or the block of a time that stands above it (a flowsheet within a flowsheet): all over one time moves together."""
+    parent = wrt.parent_block()
+    while parent is not None and parent is not block:
+        parent = parent.parent_block()
+    return wrt.parent_block() if parent is None else block
 
 
 def _active_disjunctions(block, wrt):
@@ -129,7 +139,7 @@ class FiniteElements(Transformation):
         ConfigValue(
             default=0.9,
             domain=_gamma,
-            description="gamma of eq. (10): |h_n - hbar_n| <= gamma hbar_n in the homotopy; the branch keeps the lower bound only",
+            description="gamma of eq. (10): |h_n - hbar_n| <= gamma hbar_n in the homotopy; a branch has shorter and longer ones",
         ),
     )
     CONFIG.declare(
@@ -172,8 +182,9 @@ class FiniteElements(Transformation):
         config = self.CONFIG(kwds.pop('options', {}))
         config.set_value(kwds)
         wrt = find_continuous_set(instance, config.wrt, 'fesd.finite_elements')
+        instance = _holder(instance, wrt)
         self._check(instance, wrt, config)
-        with restored_on_error(instance, wrt):
+        with restored_on_error(instance, wrt), PauseGC():
             stages, times = self._discretise(instance, wrt, config), TimeIndex(wrt)
             grid = read_grid(wrt, stages)
             fix_given(config.piecewise_constant, grid, wrt)
@@ -222,6 +233,7 @@ class FiniteElements(Transformation):
         check_told(config.continuous, config.piecewise_constant, wrt)
         check_free_time(config.final_time, config.stage_lengths, wrt)
         refuse_lists_of_times(instance, TimeIndex(wrt))
+        refuse_waiting_space(instance.model(), wrt)
         if discretised(wrt):
             return
         if config.stages is not None:

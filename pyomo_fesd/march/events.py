@@ -63,9 +63,12 @@ class Memory:
         return [m.weights[label].expr for m in self._modes if m.weights[label].expr.is_variable_type()]
 
     def limits(self, element):
-        """The conditions in an element, each for its mode only: nu c + (1 - nu) >= 0."""
-        labels = own_labels(element)
-        return [m.weight(element) * c + (1 - m.weight(element)) >= 0 for m in self._modes for t in labels for c in m.conditions[t]]
+        """The conditions in an element by name, each for its mode only: nu c + (1 - nu) >= 0 at every label."""
+        return {
+            f'{m.name} {k}': [m.weight(element) * c + (1 - m.weight(element)) >= 0 for c in values]
+            for m in self._modes
+            for k, values in enumerate(zip(*(m.conditions[t] for t in own_labels(element))))
+        }
 
     def set_weights(self, element):
         """Give nu its value in an element."""
@@ -159,8 +162,8 @@ class Jumps:
         self._just = set()
 
     def limits(self, element):
-        """The guards in an element."""
-        return [j.guards[t] >= 0 for j in self._jumps for t in own_labels(element)]
+        """The guards in an element by name, at every label."""
+        return {j.name: [j.guards[t] >= 0 for t in own_labels(element)] for j in self._jumps}
 
     def arrived(self, element):
         """For each law the place in (left, own labels) where its guard has fallen to zero, or None.

@@ -5,6 +5,7 @@ from pyomo.core.expr import EqualityExpression
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching, structural_rank
 
+from pyomo_fesd.complementarity import read
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.march.equations import variables_of
 
@@ -57,7 +58,8 @@ def refuse_free_start(equations, states):
 def _incidence(equations, unknown):
     """Which unknowns stand in which equation or condition."""
     columns = {id(v): j for j, v in enumerate(unknown)}
-    determining = [(row,) for row in equations.rows if isinstance(row, EqualityExpression)] + equations.conditions
+    determining = [(row,) for row in equations.all_rows if isinstance(row, EqualityExpression)]
+    determining += map(read, equations.conditions)
     places = [(i, columns[id(v)]) for i, row in enumerate(determining) for v in variables_of(row) if id(v) in columns]
     rows, ends = zip(*places) if places else ((), ())
     return csr_matrix((np.ones(len(places)), (rows, ends)), shape=(len(determining), len(columns)))

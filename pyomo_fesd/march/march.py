@@ -9,6 +9,7 @@ Does not apply: to systems with freedom; inputs have to be given.
 """
 
 import logging
+from dataclasses import replace
 
 from pyomo.common.collections import ComponentSet
 
@@ -20,17 +21,25 @@ from pyomo_fesd.march.accumulation import accumulation
 from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
+from pyomo_fesd.march.kind import Kind, State, active_at_first
+from pyomo_fesd.march.prescribed import prescribed_states
+from pyomo_fesd.march.residuals import largest_residuals
+from pyomo_fesd.march.shares import Even, Passed, equal_lengths, wanted
 from pyomo_fesd.march.window import Window
+from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex, derivatives
 from pyomo_fesd.trajectory import physical_time
 
 logger = logging.getLogger('pyomo_fesd')
 
-#: A step shorter than this part of its share is none.
+#: Parts of an element's length, or of its share if that is longer: what is left of a stage after a switch may be as short as the
+#: solver's tolerances.  A step shorter than this is none.
 NO_STEP = 1e-9
-#: A step that is shorter than its share by more than this part has been cut short by an event.
+#: A step that is shorter than its share by more than this has been cut short by an event.
 CUT = 1e-7
+#: Lengths between two switches are equal if they differ by less than this part; what is left after so many marches may be larger.
+EQUAL, NEARLY, PASSES = 1e-11, 1e-7, 6
 #: How an element is tried, one after the other: from where the last one ended; from afar; with other starts.  A step of no
 #: length is a local solution of its own where a switch lies on the left boundary, so the later ones look farther.
 TRIES = (
@@ -44,21 +53,22 @@ TRIES = (
 class March:
     """One march over one moving grid."""
 
-    def __init__(self, model, wrt, inputs, options):
-        self._model, self._wrt, self._options = model, wrt, options
+    def __init__(self, model, wrt, inputs, options, timer):
+        self._model, self._wrt, self._options, self._timer = model, wrt, options, timer
         self._block, self._times = records(model).grids[wrt], TimeIndex(wrt)
         self._grid = grid_of(self._block)
         modes, jumps = read_modes(model, wrt), read_jumps(model, wrt)
         systems = dict.fromkeys(m.system for m in modes)
         self._memories = [Memory([m for m in modes if m.system == s], self._block.component('memory')) for s in systems]
         self._jumps = Jumps(jumps, self._block.component('jumps'))
-        self._reader = Reader(model, self._block, self._times, self._given(inputs))
-        self._equations, self._windows = {}, {}
+        self._reader = Reader(model, self._block, self._grid, self._times, self._given(inputs))
+        self._equations, self._kinds, self._state, self._passed = {}, {}, State(), {}
         self._time, self._events = float(wrt.first()), {}
 
     def _given(self, inputs):
         """Inputs, controls that are held on each stage, and weights of modes with memory."""
         given = ComponentSet(v for u in inputs for v in u.values())
+        given.update(prescribed_states(self._model, self._wrt))
         for row in self._block.held.values():
             # the value at the end of its stage counts
             *others, last = sorted(variables_of([row.body]), key=self._times.time)
@@ -69,17 +79,42 @@ class March:
         return given
 
     def run(self):
-        """March through all elements; where their number does not fit the switches of a stage, again with one for each of them."""
-        self._begin()
+        """March through all elements, and again with equal lengths between the switches that were found."""
+        with phase(self._timer, 'begin'):
+            self._begin()
+        shares = self._enough_elements()
+        if wanted(self._block) and not self._equalise():
+            self._through(shares)
+        self._warn_short()
+
+    def _enough_elements(self):
+        """Where their number does not fit the switches of a stage, march again with one for each of them; returns the shares."""
         reserve, tried = dict.fromkeys(self._grid.stages, 0), set()
         while True:
-            stage = self._through(reserve)
+            shares = Even(dict(reserve))
+            stage = self._through(shares)
             if stage is None:
-                return self._warn_short()
+                return shares
             reserve[stage] = self._expected(stage)
             if tuple(reserve.values()) in tried:
                 raise self._used_up(stage)
             tried.add(tuple(reserve.values()))
+
+    def _equalise(self):
+        """March with equal lengths between switches until they fit; returns whether they do."""
+        equal, differs = equal_lengths(self._block, self._grid, self._passed)
+        for _ in range(PASSES):
+            if differs <= EQUAL:
+                return True
+            try:
+                if self._through(equal) is not None:
+                    return False
+            except FesdError:
+                return False
+            before, (equal, differs) = equal, equal_lengths(self._block, self._grid, self._passed)
+            if equal.last != before.last:
+                return False
+        return differs <= NEARLY
 
     def _expected(self, stage):
         """The switches to expect in a stage whose elements did not fit; all of them are for switches if these accumulate there."""
@@ -97,45 +132,51 @@ class March:
         states = [d.get_state_var() for d in derivatives(self._model, self._wrt)]
         refuse_free_start(equations, [v for x in states for v in x.values() if self._times.time(v) == first and not v.fixed])
         if equations.unknown:
-            window = Window(equations, self._options)
-            self._require(window.solve(equations))
+            with phase(self._timer, 'compile'):
+                window = Window(equations, self._options)
+            with phase(self._timer, 'window'):
+                self._require(window.solve(equations), equations, window)
             window.put_out(equations)
 
-    def _through(self, reserve):
+    def _through(self, shares):
         """March once; returns the stage whose elements do not fit, None if all went well.
 
         Parameters
         ----------
-        reserve : dict stage -> number of switches to be expected
+        shares : Even or Equal
+            how long the elements are to be
         """
-        self._time, self._events = float(self._wrt.first()), {stage: [] for stage in reserve}
+        first = self._wrt.first()
+        self._time, self._events = float(first), {stage: [] for stage in self._grid.stages}
         self._jumps.begin()
         for memory in self._memories:
-            memory.begin(self._wrt.first())
-        warm = False
+            memory.begin(first)
+        warm, self._state = False, State(active_at_first(self._reader.sides(first)))
         for stage, elements in self._grid.stages.items():
             rest = sum(e.length for e in elements)
-            for number, element in enumerate(elements):
-                left, expected = len(elements) - number, max(0, reserve[stage] - len(self._events[stage]))
-                share = rest / max(1, left - expected)
+            self._state = replace(self._state, left=None)
+            for left, element in zip(range(len(elements), 0, -1), elements):
+                share = shares.most(element, rest, left, len(self._events[stage]))
                 h, happened = self._advance(element, share, warm)
-                cut = h < share * (1 - CUT)
+                self._passed[element.n] = Passed(self._state.theta, bool(happened))
+                least = CUT * max(share, element.length)
+                cut = h < share - least
                 # after a switch another active set holds
                 warm = bool(happened) or not cut
                 rest, self._time = rest - h, self._time + h
                 if cut or happened:
                     self._events[stage].append((self._time, ', '.join(happened) or 'switch'))
-                if (rest <= CUT * share) != (left == 1):
+                if (rest <= least) != (left == 1):
                     return stage
         for memory in self._memories:
-            memory.settle(self._grid, self._wrt.first())
+            memory.settle(self._grid, first)
         return None
 
     def _advance(self, element, share, warm):
         """One element of at most the length ``share``; returns its length and what happens at its end."""
         for memory in self._memories:
             memory.set_weights(element)
-        h, last = self._step(element, share, warm), len(own_labels(element))
+        (h, state), last = self._step(element, share, warm), len(own_labels(element))
         while True:
             arrived = [(memory, memory.arrived(element)) for memory in self._memories]
             jumped = self._jumps.arrived(element)
@@ -143,7 +184,8 @@ class March:
             if min(places, default=last) == last:
                 break
             # a stage point is there already: the element ends where that point was
-            h = self._step(element, h * self._grid.tau[min(places) - 1], True)
+            h, state = self._step(element, h * self._grid.tau[min(places) - 1], True)
+        self._state = state
         if element is self._grid.elements[-1]:
             return h, []
         happened = self._jumps.end(element, jumped)
@@ -151,33 +193,47 @@ class March:
             if last in found or memory.ends_beyond(element.n, element.right):
                 memory.end(element.n, element.right)
                 happened.append(memory.name)
+        if happened:
+            self._state = replace(state, left=None)
         return h, happened
 
     def _step(self, element, most, warm):
-        """Solve one element with a length of at most ``most``; returns its length."""
+        """Solve one element with a length of at most ``most``; returns its length and the state at its end."""
         equations = self._problem(element)
-        if equations.kind not in self._windows:
+        if equations.kind not in self._kinds:
             refuse_freedom(equations)
-            self._windows[equations.kind] = Window(equations, self._options), element.length
-        window, nominal = self._windows[equations.kind]
+            self._kinds[equations.kind] = Kind(equations, element, self._grid, self._options, self._timer)
+        kind = self._kinds[equations.kind]
+        found = kind.smooth_step(equations, self._state, most, lambda: self._values_before(equations, element))
+        longest = max(most, element.length)
+        h, state = self._by_window(kind, equations, most, warm, NO_STEP * longest) if found is None else found
+        h = most if h > most - CUT * longest else h
+        self._block.r[element.n].set_value(h / element.length, skip_validation=True)
+        return h, state
+
+    def _values_before(self, equations, element):
+        """Values of the unknowns of an element as they are on its left."""
+        return [_value_at(self._times, v, element.left) if self._times.time(v) is not None else v.value for v in equations.unknown]
+
+    def _by_window(self, kind, equations, most, warm, least):
+        """Where the next active set is not known, or does not hold: a step longer than ``least``."""
         for options in TRIES[not warm :]:
-            answer = window.solve(equations, most / nominal, **options)
-            h = window.length * nominal
-            if answer.stationarity == 'B' and h > NO_STEP * most:
-                h = most if h > most * (1 - CUT) else h
-                window.put_out(equations)
-                self._block.r[element.n].set_value(h / element.length, skip_validation=True)
-                return h
-        self._require(answer)
+            answer, h = kind.window_step(equations, most, options)
+            if answer.stationarity == 'B' and h > least:
+                return kind.take_window(equations, most, h)
+        self._require(answer, equations, kind.window)
+        kind.window.force(equations, most / kind.nominal)
+        missed = largest_residuals(self._model, self._times, equations, kind.window.values)
         raise self._stuck(
-            f"no step is possible from time {self._time:.6g}",
+            f"no step is possible from time {self._time:.6g}" + (f"; where one is forced, {missed}" if missed else ''),
             "look for a bound that the solution reaches there, or for a state from which no mode leads on",
         )
 
     def _problem(self, element):
         if element.n not in self._equations:
-            limits = [row for memory in self._memories for row in memory.limits(element)]
-            self._equations[element.n] = self._reader.element(element, [*limits, *self._jumps.limits(element)])
+            with phase(self._timer, 'read'):
+                limits = {name: rows for law in (*self._memories, self._jumps) for name, rows in law.limits(element).items()}
+                self._equations[element.n] = self._reader.element(element, limits)
         return self._equations[element.n]
 
     def _warn_short(self):
@@ -190,16 +246,17 @@ class March:
                 if 0 < b - a < least * (1 - CUT):
                     logger.warning(
                         "simulate: from time %.6g to %.6g there is less time between two switches than the least element length "
-                        "%.3g, so mpec_hybrid will not find this solution. Take more elements (nfe) or a larger length_bounds.",
+                        "%.3g, so mpec_hybrid will not find this solution. Take more elements (nfe).",
                         a,
                         b,
                         least,
                     )
 
-    def _require(self, answer):
+    def _require(self, answer, equations, window):
         if answer.stationarity != 'B':
+            missed = largest_residuals(self._model, self._times, equations, window.values)
             raise self._stuck(
-                f"no solution at time {self._time:.6g}: {answer.reason}",
+                f"no solution at time {self._time:.6g}: {missed or answer.reason or answer.outcome}",
                 "check the equations there; more elements help where the solution is steep",
             )
 
@@ -220,3 +277,12 @@ class March:
             f"the elements of control stage {stage} are used up at time {self._time:.6g}, after {number} switches",
             "take more elements (nfe)",
         )
+
+
+def _value_at(times, v, label):
+    """Value of the counterpart of a variable at another time, or its own where there is none."""
+    try:
+        found = times.at(v, label).value
+    except KeyError:
+        found = None
+    return v.value if found is None else found

@@ -9,17 +9,21 @@ Does not apply: to systems with freedom; inputs have to be given.
 """
 
 from pyomo.common.collections import ComponentMap
+from pyomo.common.gc_manager import PauseGC
+from pyomo.common.timing import HierarchicalTimer
 
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.indicators import set_indicators
 from pyomo_fesd.march.march import March
+from pyomo_fesd.march.timeless import solve_timeless
+from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.records import records
 from pyomo_fesd.review import review
 from pyomo_fesd.timeindex import TimeIndex, derivatives, find_continuous_set
 from pyomo_fesd.trajectory import trajectory
 
 
-def simulate(model, wrt=None, inputs=(), **options):
+def simulate(model, wrt=None, inputs=(), timer=None, **options):
     """Simulate a system without freedom on its moving grid, element by element.
 
     Parameters
@@ -30,7 +34,9 @@ def simulate(model, wrt=None, inputs=(), **options):
     inputs : Var or list of Var
         variables over time that keep their present values, as a guess of controls; those that are named in
         ``piecewise_constant`` need not be named again
-    options : options of ``mpec_hybrid`` for the small problem of each element
+    timer : pyomo.common.timing.HierarchicalTimer, optional
+        for the time of each phase
+    options : options of ``mpec_hybrid`` for the small problems where modes change
 
     Returns
     -------
@@ -46,12 +52,20 @@ def simulate(model, wrt=None, inputs=(), **options):
     if wrt not in records(model).grids:
         raise FesdError(wrt, "simulate: its elements are not movable", "apply fesd.finite_elements first")
     inputs = list(inputs) if isinstance(inputs, (list, tuple)) else [inputs]
+    solve_timeless(model, wrt)
     ends = _fixed_later(model, wrt)
+    timer = timer or HierarchicalTimer()
     try:
-        March(model, wrt, inputs, options).run()
-        set_indicators(model)
-        review(model)
-        return trajectory(model, wrt)
+        with phase(timer, 'simulate'), PauseGC():
+            with phase(timer, 'read'):
+                march = March(model, wrt, inputs, options, timer)
+            with phase(timer, 'march'):
+                march.run()
+            with phase(timer, 'review'):
+                set_indicators(model)
+                review(model)
+            with phase(timer, 'trajectory'):
+                return trajectory(model, wrt)
     finally:
         for v, given in ends.items():
             v.set_value(given, skip_validation=True)

@@ -39,7 +39,7 @@ def compile_problem(problem, timer, folder=None, parameters=(), user_scaling=Tru
     Contradiction
         where fixed values alone violate a constraint
     """
-    factors = UserFactors(problem.model, user_scaling)
+    factors = UserFactors(user_scaling)
     with symbols(problem.model, parameters) as handles, entries_of(problem, handles) as entries:
         nl = _through_file(problem.model, handles, timer, folder)
         with phase(timer, 'assemble'):

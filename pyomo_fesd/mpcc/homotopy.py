@@ -105,6 +105,8 @@ class Homotopy:
         step, options = self._ladder.pop(0), self._options
         self._steps.note(step.what, relaxed.w)
         self._gap.restart()
+        if step.other_form and self._c.widen() and self._branches is not None:
+            self._branches.forget()
         eps = max(step.eps(options.eps_init, stage.eps, options.eps_factor), options.eps_final)
         return _Stage((stage.path + step.other_form) % len(self._paths), step.start(self._start, relaxed.w, self), eps)
 
@@ -141,13 +143,18 @@ class Homotopy:
         return None not in (before, now) and max(before, now) - best <= same
 
     def _other_form(self, stage, relaxed):
-        """Where a path ends with nothing certified the next one begins."""
-        if self._branches is None or stage.path + 1 == len(self._paths) or self._certified():
+        """Where a path ends with nothing certified: the same with shorter elements if nothing is feasible, then the next path."""
+        if self._branches is None or self._certified():
             return None
-        self._steps.note("nothing certified on this path, other form", relaxed.w)
+        wider = self.run.point is None and self._c.widen()
+        path = stage.path + (not wider)
+        if path == len(self._paths):
+            return None
+        found = "feasible" if wider else "certified"
+        self._steps.note(f"nothing {found} on this path, " + ("shorter elements" if wider else "other form"), relaxed.w)
         self._gap.restart()
         self._branches.forget()
-        return _Stage(stage.path + 1, self._start, self._options.eps_init)
+        return _Stage(path, self._start, self._options.eps_init)
 
     def _certified(self):
         return self.run.point is not None and self.run.point.certificate.certified

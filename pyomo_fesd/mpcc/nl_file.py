@@ -2,12 +2,12 @@
 
 import os
 import tempfile
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from pyomo.core import Block
+from pyomo.core import Block, Suffix
 from pyomo.core.expr import Expr_ifExpression, ExternalFunctionExpression, UnaryFunctionExpression
 from pyomo.repn.plugins.nl_writer import NLWriter
 
@@ -51,9 +51,22 @@ def write(model, folder):
         where fixed values alone violate a constraint
     """
     path = os.path.join(folder, 'model.nl')
-    with open(path, 'w', newline='') as stream:
+    with open(path, 'w', newline='') as stream, _suffixes_asleep(model):
         info = NLWriter().write(model, stream, linear_presolve=False, scale_model=False, symbolic_solver_labels=False)
     return path, info.variables, info.constraints
+
+
+@contextmanager
+def _suffixes_asleep(model):
+    """Without the suffixes that the NL writer would export; casadi cannot read them."""
+    suffixes = [s for s in model.component_objects(Suffix, active=True, descend_into=Block) if s.export_enabled()]
+    for suffix in suffixes:
+        suffix.deactivate()
+    try:
+        yield
+    finally:
+        for suffix in suffixes:
+            suffix.activate()
 
 
 def read(model, handles, path, variables, constraints):

@@ -166,13 +166,15 @@ def nlp_solver(name):
     return kind if name in NLP_SOLVERS else partial(kind, name)
 
 
-def check_options(name, options, complaint):
+def check_options(name, options, complaint, where='nlp_options'):
     """Raise if the solver refuses the user's options, with the name of the one that it refuses.
 
     Parameters
     ----------
     complaint : callable dict -> str or None
         what the solver says against these options
+    where : str
+        how the user gives them
     """
     said = complaint(options) if options else None
     if said is None:
@@ -185,9 +187,9 @@ def check_options(name, options, complaint):
             key, shown, said = alone, repr(value), against
             break
     raise FesdError(
-        f"nlp_options['{key}']",
+        f"{where}['{key}']",
         f"{name} refuses {shown}: {' '.join(said.split())}",
-        f"nlp_options go to {name} unchanged: take names and values from its documentation",
+        f"{where} go to {name} unchanged: take names and values from its documentation",
     )
 
 

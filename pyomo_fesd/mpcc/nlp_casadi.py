@@ -67,9 +67,14 @@ class _Watch(ca.Callback):
         length = {'x': n, 'lam_x': n, 'f': 1, 'g': m, 'lam_g': m, 'lam_p': p}[ca.nlpsol_out(i)]
         return ca.Sparsity.dense(length, 1)
 
-    def eval(self, arg):
+    def has_eval_buffer(self):
+        # no copies of the point, which nobody looks at
+        return True
+
+    def eval_buffer(self, arg, res):
         self.left -= 1
-        return [float(self.left < 0 or self._deadline.expired())]
+        res[0].cast('d')[0] = self.left < 0 or self._deadline.expired()
+        return 0
 
 
 class _CasadiNlp(NlpSolver):
@@ -77,6 +82,8 @@ class _CasadiNlp(NlpSolver):
 
     #: Name of casadi's plug-in, what keeps it silent, whether it takes derivatives of ours.
     PLUGIN, SILENT, TAKES_DERIVATIVES = '', {}, False
+    #: How the user gives its options.
+    GIVEN = 'nlp_options'
 
     @staticmethod
     def missing(name):
@@ -85,7 +92,7 @@ class _CasadiNlp(NlpSolver):
 
     def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
         self._size, options = x.numel() + g.numel(), options or {}
-        check_options(self.PLUGIN, options, self._complaint)
+        check_options(self.PLUGIN, options, self._complaint, self.GIVEN)
         self._watch = _Watch(x.numel(), g.numel(), p.numel(), deadline or Deadline())
         settings = {'print_time': False, 'iteration_callback': self._watch}
         if self.TAKES_DERIVATIVES:
@@ -152,6 +159,15 @@ class CasadiIpopt(_CasadiNlp):
 
     def _settings(self, budget, options, warm=False):
         return IPOPT | budget | (IPOPT_WARM if warm else {}) | options
+
+
+class PlainIpopt(CasadiIpopt):
+    """Ipopt with its own defaults.  See ``NlpSolver``."""
+
+    GIVEN = 'options'
+
+    def _settings(self, budget, options, warm=False):
+        return budget | options
 
 
 class CasadiUno(_CasadiNlp):

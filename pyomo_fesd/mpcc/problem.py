@@ -73,10 +73,10 @@ class Mpcc:
         conditions l <= B <= u perp F, split into two pairs with two auxiliary variables when compiled
     decisions : list of Decision
     penalties : list of (Expression, float)
-    artificial : ComponentMap Var -> float
-        variables whose bounds belong to the method, with their upper bound in the homotopy
+    artificial : ComponentMap Var -> (low, high)
+        variables whose bounds belong to the method, with those that they have in the homotopy
     moves : list of lists of (component, value)
-        marks MOVE, those of one move together
+        marks MOVE
     objective : ObjectiveData or None
     sources : list of ComplementarityData
         every active condition
@@ -93,15 +93,15 @@ class Mpcc:
     sources: list = field(default_factory=list)
 
 
-def read_problem(model):
-    """Read ``model``; nothing is changed.
+def read_problem(model, solver='mpec_hybrid'):
+    """Read ``model`` for ``solver``; nothing is changed.
 
     Raises
     ------
     FesdError
         for active Disjunctions, logic, SOS, integer variables, more than one objective, and conditions that are no pairs
     """
-    _refuse(model)
+    _refuse(model, solver)
     problem = Mpcc(model, objective=_objective(model))
     decided = {id(pair): constraint for pair, constraint in marks.marked(model, marks.DECIDED)}
     tentative = ComponentSet(pair for pair, _ in marks.marked(model, marks.TENTATIVE))
@@ -116,20 +116,18 @@ def read_problem(model):
             problem.conditions.append(Condition(source, *condition))
     problem.penalties = list(marks.marked(model, marks.PENALTY))
     problem.artificial = ComponentMap(marks.marked(model, marks.ARTIFICIAL))
-    problem.moves = [list(suffix.items()) for suffix in marks.suffixes(model, marks.MOVE)]
+    problem.moves = [list(together) for _, together in marks.marked(model, marks.MOVE)]
     return problem
 
 
-def _refuse(model):
+def _refuse(model, solver):
     for ctype, fix in REFUSED.items():
         found = next(model.component_data_objects(ctype, active=True, descend_into=Block), None)
         if found is not None:
-            raise FesdError(found, f"an active {ctype.__name__}, which mpec_hybrid does not handle", fix)
+            raise FesdError(found, f"an active {ctype.__name__}, which {solver} does not handle", fix)
     for v in model.component_data_objects(Var, active=True, descend_into=Block):
         if not v.fixed and not v.is_continuous():
-            raise FesdError(
-                v, "an integer variable", "fix it, or relax its domain: mpec_hybrid decides complementarities, not integers"
-            )
+            raise FesdError(v, "an integer variable", f"fix it, or relax its domain: {solver} does not decide integers")
 
     for name, what in UNDONE.items():
         found = next(marks.marked(model, name), None)

@@ -43,7 +43,7 @@ def fill(results, model, run, compiled=None, reason=''):
         # stopped by a limit: what the best point is decides
         status = _status_of(run)
     results.termination_condition, results.solution_status = condition, status
-    results.solution_loader = Loader(model, compiled, run)
+    results.solution_loader = Loader(model, compiled, run.w, None if run.point is None else run.point.nlp)
     if run.point is not None and compiled.has_objective:
         results.incumbent_objective = compiled.objective(run.point.f)
     info = results.extra_info
@@ -92,9 +92,9 @@ class Loader(SolutionLoader):
     Loading also sets the indicator variables of the disjuncts that ``fesd.dcs`` transformed.
     """
 
-    def __init__(self, model, compiled, run):
-        self._pyomo_model, self._c, self._w = model, compiled, None if run.w is None else compiled.values(run.w)
-        self._nlp = None if run.point is None else run.point.nlp
+    def __init__(self, model, compiled, w, nlp):
+        self._pyomo_model, self._c, self._w = model, compiled, None if w is None else compiled.values(w)
+        self._nlp = nlp
 
     def get_number_of_solutions(self):
         """1, or 0 if no point was reached."""
@@ -122,6 +122,13 @@ class Loader(SolutionLoader):
         # a relaxation may have a slack behind the variables
         lam = -c.sign * self._nlp.lam_x[: len(c.variables)] * c.scale.x / c.scale.f
         return _select(ComponentMap, c.variables, lam, vars_to_load)
+
+    def load_import_suffixes(self):
+        """Multipliers into import suffixes, which stay empty where there are none."""
+        try:
+            super().load_import_suffixes()
+        except (NoDualsError, NoReducedCostsError):
+            pass
 
     def load_vars(self, vars_to_load=None):
         super().load_vars(vars_to_load)

@@ -8,7 +8,6 @@ scaled to a largest gradient entry of 1 when that is far from 1, because "both s
 from dataclasses import dataclass
 
 import numpy as np
-from pyomo.core import Suffix
 from pyomo.core.base.suffix import SuffixFinder
 
 #: Gradients of a side within these bounds are left as they are.
@@ -26,11 +25,13 @@ class Scale:
 
 
 class UserFactors:
-    """Pyomo's ``scaling_factor`` suffixes of a model; every factor is 1 where there are none or they are not wanted."""
+    """Pyomo's ``scaling_factor`` suffixes; every factor is 1 where there are none or they are not wanted.
 
-    def __init__(self, model, wanted):
-        present = any(s.local_name == 'scaling_factor' for s in model.component_objects(Suffix, active=True))
-        self._find = SuffixFinder('scaling_factor', 1.0, model).find if wanted and present else None
+    Those on the blocks above a component count, whatever block is solved.
+    """
+
+    def __init__(self, wanted):
+        self._find = SuffixFinder('scaling_factor', 1.0).find if wanted else None
 
     def of(self, components):
         """Factors of ``components``, as an array."""

@@ -9,7 +9,10 @@ from dataclasses import dataclass
 
 from pyomo.common.collections import ComponentMap
 from pyomo.common.modeling import unique_component_name
-from pyomo.core import Block, ConstraintList, Objective, Suffix, VarList, quicksum, value
+from pyomo.common.numeric_types import native_numeric_types
+from pyomo.core import Block, ConstraintList, Objective, VarList, quicksum, value
+from pyomo.core.expr import Expr_ifExpression, PowExpression, ProductExpression
+from pyomo.core.expr.numvalue import is_potentially_variable
 from pyomo.repn import generate_standard_repn
 
 from pyomo_fesd.mpcc.problem import Condition
@@ -17,6 +20,8 @@ from pyomo_fesd.mpcc.source import set_parts
 
 #: A bound that no sum reaches.
 ALWAYS = 1e300
+#: Nodes that may be fixed although one of their arguments is not.
+WHOLE = (PowExpression, Expr_ifExpression)
 
 
 @dataclass(frozen=True)
@@ -45,16 +50,14 @@ class Entries:
 
 @contextmanager
 def entries_of(problem, handles):
-    """The ``Entries`` of ``problem`` on a scratch block; its pairs and the exported suffixes sleep while it exists."""
+    """The ``Entries`` of ``problem`` on a scratch block; its pairs sleep while it exists."""
     model, scratch = problem.model, Block()
     model.add_component(unique_component_name(model, '_pyomo_fesd_scratch'), scratch)
-    pairs, suffixes = _sleep(problem.sources), _sleep_suffixes(model)
+    pairs = _sleep(problem.sources)
     try:
         yield _entries(scratch, problem, handles)
     finally:
         model.del_component(scratch)
-        for suffix in suffixes:
-            suffix.activate()
         _wake(pairs)
 
 
@@ -102,12 +105,33 @@ def _entry(scratch, expr):
     """What stands for ``expr`` in the NL file."""
     if not hasattr(expr, 'is_fixed'):
         return value(expr)
-    if expr.is_fixed():
+    if not _varies(expr) and expr.is_fixed():
         # 0 * x is fixed although x may have no value
         return generate_standard_repn(expr, compute_values=True).constant
     if expr.is_variable_type():
         return expr
     return scratch.row.add(expr >= 0)
+
+
+def _varies(expr):
+    """Whether the first variables of ``expr`` show that it is not fixed; Pyomo's ``is_fixed`` always looks at all."""
+    waiting = [expr]
+    while waiting:
+        node = waiting.pop()
+        if node.is_variable_type():
+            if node.fixed:
+                return False
+        elif isinstance(node, ProductExpression):
+            # each factor has to vary: one may be 0
+            factors = [a for a in node.args if a.__class__ not in native_numeric_types or a == 0]
+            if not all(map(is_potentially_variable, factors)):
+                return False
+            waiting += factors
+        elif isinstance(node, WHOLE) or not node.is_expression_type():
+            return False
+        else:
+            waiting.append(next(filter(is_potentially_variable, node.args)))
+    return True
 
 
 def _keep(scratch, entries):
@@ -131,11 +155,3 @@ def _wake(components):
         component._active = True
         for data in datas:
             data.activate()
-
-
-def _sleep_suffixes(model):
-    """Deactivate the suffixes that the NL writer would export; returns them."""
-    suffixes = [s for s in model.component_objects(Suffix, active=True, descend_into=Block) if s.export_enabled()]
-    for suffix in suffixes:
-        suffix.deactivate()
-    return suffixes

@@ -15,7 +15,7 @@ from tests.problems.running import LEGENDRE, RADAU, move, transform
 
 def moves(m):
     """``{(boundary, step): [(component, value)]}``."""
-    return {s.parent_block().index(): list(s.items()) for s in marks.suffixes(m, marks.MOVE)}
+    return {move.index(): list(together) for move, together in marks.marked(m, marks.MOVE)}
 
 
 def pairs(entries):

@@ -19,8 +19,9 @@ from tests.problems.running import LEGENDRE, SCHEMES, move, transform
 def problems(m, given=()):
     """The problems of all elements."""
     block = records(m).grids[m.t]
-    reader = Reader(m, block, TimeIndex(m.t), ComponentSet(v for u in given for v in u.values()))
-    return [reader.element(e, []) for e in grid_of(block).elements]
+    grid = grid_of(block)
+    reader = Reader(m, block, grid, TimeIndex(m.t), ComponentSet(v for u in given for v in u.values()))
+    return [reader.element(e, {}) for e in grid.elements]
 
 
 def names(variables):

@@ -1,0 +1,26 @@
+"""Additions to unit models that switch: ``m.fs.weir = pyomo_fesd.units.weir(m.fs.time, level=..., crest=..., flow=...)``.
+
+Each takes Vars and expressions over time of any Pyomo block, and returns a Block over time to be added; nothing here knows IDAES.
+"""
+
+from pyomo_fesd.units.anti_windup import anti_windup
+from pyomo_fesd.units.check_valve import check_valve
+from pyomo_fesd.units.pump import pump
+from pyomo_fesd.units.relay import relay
+from pyomo_fesd.units.relief_valve import relief_valve
+from pyomo_fesd.units.saturation import saturation
+from pyomo_fesd.units.split_range import split_range
+from pyomo_fesd.units.vle import vle
+from pyomo_fesd.units.weir import weir
+
+__all__ = [
+    'anti_windup',
+    'check_valve',
+    'pump',
+    'relay',
+    'relief_valve',
+    'saturation',
+    'split_range',
+    'vle',
+    'weir',
+]
