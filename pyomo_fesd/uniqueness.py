@@ -69,7 +69,7 @@ class _Rates:
     def __init__(self, model, wrt):
         self._rates = ComponentMap((d.get_state_var(), d) for d in derivatives(model, wrt))
         self._given = ComponentSet(v for name in (marks.SELECTOR, marks.CONTINUOUS) for v, _ in marks.marked(model, name))
-        self._rows, times = defaultdict(list), TimeIndex(wrt)
+        self._rows, self._linear, times = defaultdict(list), {}, TimeIndex(wrt)
         for c in model.component_data_objects(Constraint, active=True, descend_into=Block):
             if c.equality and not c.parent_component().local_name.endswith(DISCRETISATION):
                 self._rows[times.time(c)].append(c)
@@ -87,21 +87,35 @@ class _Rates:
 
     def _change(self, label, nu):
         """How derivatives and algebraic variables at ``label`` change with nu, by the implicit function theorem."""
-        columns, entries, right = ComponentMap(), [], []
+        if label not in self._linear:
+            self._linear[label] = self._linearised(label)
+        columns, J, others = self._linear[label]
+        if not columns:
+            return ComponentMap()
+        right = np.zeros(J.shape[0])
+        for row, gradient in others.get(id(nu), ()):
+            right[row] -= gradient
+        return ComponentMap(zip(columns, lsqr(J, right, atol=EXACT, btol=EXACT)[0]))
+
+    def _linearised(self, label):
+        """Columns and Jacobian of the unknowns in the equations at ``label``; by id, where the other variables stand in them."""
+        columns, entries, others, number = ComponentMap(), [], defaultdict(list), 0
         for c in self._rows[label]:
             variables = list(identify_variables(c.body))
-            if not any(map(self._unknown, variables)):
+            unknown = [self._unknown(v) for v in variables]
+            if not any(unknown):
                 continue
             gradient = differentiate(c.body, wrt_list=variables, mode=Modes.reverse_numeric)
-            right.append(-sum(g for v, g in zip(variables, gradient) if v is nu))
-            for v, g in zip(variables, gradient):
-                if self._unknown(v):
-                    entries.append((g, len(right) - 1, columns.setdefault(v, len(columns))))
+            for v, g, sought in zip(variables, gradient, unknown):
+                if sought:
+                    entries.append((g, number, columns.setdefault(v, len(columns))))
+                else:
+                    others[id(v)].append((number, g))
+            number += 1
         if not entries:
-            return ComponentMap()
+            return columns, None, others
         numbers, rows, places = zip(*entries)
-        J = csr_matrix((numbers, (rows, places)), shape=(len(right), len(columns)))
-        return ComponentMap(zip(columns, lsqr(J, np.array(right, dtype=float), atol=EXACT, btol=EXACT)[0]))
+        return columns, csr_matrix((numbers, (rows, places)), shape=(number, len(columns))), others
 
     def _unknown(self, v):
         home = v.parent_component()

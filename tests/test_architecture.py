@@ -27,11 +27,23 @@ def test_rooms_import_nothing_from_each_other(room):
 
 
 def test_the_march_looks_at_elements_and_nothing_looks_at_the_march():
-    """Like reports and pictures it reads what the elements recorded; the solver it knows by Pyomo's name only."""
+    """It reads what the elements recorded, and compiles as the solver does; the solver itself it knows by Pyomo's name only."""
+    compiles = {f'pyomo_fesd.mpcc.{name}' for name in ('compile', 'phase', 'problem')}
     for path in (PACKAGE / 'march').glob('*.py'):
-        assert not [n for n in imports(path) if n.startswith(('pyomo_fesd.dcs', 'pyomo_fesd.mpcc', 'pyomo_fesd.solver'))], path
-    others = (p for p in PACKAGE.rglob('*.py') if p.parent.name != 'march')
+        others = set(imports(path)) - compiles
+        assert not [n for n in others if n.startswith(('pyomo_fesd.dcs', 'pyomo_fesd.mpcc', 'pyomo_fesd.solver'))], path
+    others = (p for p in PACKAGE.rglob('*.py') if p.parent.name not in ('march', 'accuracy'))
     assert [p for p in others if any(n.startswith('pyomo_fesd.march') for n in imports(p))] == [PACKAGE / '__init__.py']
+
+
+def test_accuracy_control_calls_the_transformation_the_solver_and_the_march_as_a_user_does():
+    for path in (PACKAGE / 'accuracy').glob('*.py'):
+        found = [
+            n for n in imports(path) if n.startswith(('pyomo_fesd.dcs', 'pyomo_fesd.mpcc', 'pyomo_fesd.solver', 'pyomo_fesd.march'))
+        ]
+        assert set(found) <= {'pyomo_fesd.march.simulate'}, path
+    others = (p for p in PACKAGE.rglob('*.py') if p.parent.name != 'accuracy')
+    assert [p for p in others if any(n.startswith('pyomo_fesd.accuracy') for n in imports(p))] == [PACKAGE / '__init__.py']
 
 
 def test_only_the_solvers_import_mpcc():
@@ -53,6 +65,7 @@ def test_public_names():
         'plot',
         'positive_part',
         'projection',
+        'refine',
         'report',
         'simulate',
         'state_jump',

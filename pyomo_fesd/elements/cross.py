@@ -22,13 +22,13 @@ FORMS = {'element': 0, 'stage': 1, 'full': 2}
 
 
 class _Sources(AutoSlots.Mixin):
-    """Private data of the block of a moving grid: the grid, and the conditions that each aggregated pair stands for."""
+    """Private data of the block of a moving grid: the grid, the families, the conditions that each aggregated pair stands for."""
 
-    __slots__ = ('conditions', 'grid')
+    __slots__ = ('conditions', 'grid', 'families')
 
     def __init__(self):
         self.conditions = ComponentMap()
-        self.grid = None
+        self.grid, self.families = None, []
 
 
 Block.register_private_data_initializer(_Sources, scope='pyomo_fesd.elements')
@@ -49,8 +49,14 @@ def grid_of(block):
     return block.private_data('pyomo_fesd.elements').grid
 
 
+def families_of(block):
+    """The families of conditions on a moving grid, by its block."""
+    return block.private_data('pyomo_fesd.elements').families
+
+
 def add_cross_complementarity(block, families, grid, wrt, form):
     """Put the aggregated pairs on ``block`` and switch the sources off."""
+    block.private_data('pyomo_fesd.elements').families = list(families)
     block.family = Set(initialize=[f.name for f in families], ordered=True)
     points = RangeSet(len(grid.tau) + 2)  # the stages, and both boundaries of a continuous side
     block.cross = Complementarity(block.family, block.element, *[points] * FORMS[form])

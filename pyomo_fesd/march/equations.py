@@ -19,9 +19,8 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd import marks
-from pyomo_fesd.complementarity import Mixed, read
-from pyomo_fesd.elements.cross import sources
-from pyomo_fesd.elements.mixed import source
+from pyomo_fesd.complementarity import read
+from pyomo_fesd.elements.cross import families_of
 from pyomo_fesd.march.structure import Look
 from pyomo_fesd.timeindex import DISCRETISATION, derivatives
 
@@ -39,8 +38,8 @@ class Equations:
     limits : dict name -> list of relational expressions
         functions that end the element where they fall to zero, one for each of ``labels``
     pairs : list of Pair
-    points : dict name -> list of Pair
-        what the pairs stand for: conditions, one for each of ``labels``
+    points : dict name -> Points
+        what the pairs stand for
     conditions : list of ComplementarityData
         all that may determine a variable
     labels : tuple of float
@@ -50,10 +49,8 @@ class Equations:
     unknown : list of VarData
         what the problem determines
     known : list of VarData
-    held : set of int
-        ids of what repeats at the right boundary the value at the last stage
-    kind : tuple
-        equal for problems that differ only in the values of what is known
+    kind : int
+        the same for problems that differ only in the values of what is known
     reader : Reader
     """
 
@@ -66,8 +63,7 @@ class Equations:
     length: object
     unknown: list
     known: list
-    held: set
-    kind: tuple
+    kind: int
     reader: object
 
     @property
@@ -91,6 +87,37 @@ class Equations:
         """The unknowns at stage points."""
         stages = self.reader.stage_labels(self.labels)
         return [v for v in self.unknown if self.reader.time(v) in stages]
+
+
+@dataclass(frozen=True)
+class Points:
+    """A family of conditions in one element.
+
+    Attributes
+    ----------
+    pairs : list of Pair
+        one for each label, then the one after the left boundary if a state jumps there
+    labels : int
+        how many labels
+    continuous : tuple of bool
+        which of the two sides enter with their boundary values
+    """
+
+    pairs: list
+    labels: int
+    continuous: tuple
+
+    @classmethod
+    def of(cls, family, element, labels):
+        """Those of ``family``."""
+        start = family.starts.get(element.n)
+        pairs = [family.sides[t] for t in labels if t in family.sides]
+        return cls([*pairs, *([] if start is None else [start])], len(pairs), family.continuous)
+
+    @property
+    def kind(self):
+        """Equal for families that differ in their values only."""
+        return self.labels, len(self.pairs), self.continuous
 
 
 def own_labels(element):
@@ -124,7 +151,7 @@ class Reader:
     def __init__(self, model, block, grid, times, given):
         self._model, self._block, self._grid, self._times, self._given = model, block, grid, times, given
         self._states = ComponentSet(d.get_state_var() for d in derivatives(model, times.wrt))
-        self._first = times.wrt.first()
+        self._first, self._kinds = times.wrt.first(), {}
         self._read_equations()
         self._read_conditions()
 
@@ -136,13 +163,10 @@ class Reader:
             label = times.time(c)
             if label is not None and (c.equality or marks.is_generated(c)) and c.parent_block() is not memory:
                 self._equations[label].append(c)
-        self._held = defaultdict(set)
         for name in LISTS:
             for c in block.component(name).values() if block.component(name) is not None else ():
                 label = max(t for t in map(times.time, variables_of([c.body])) if t is not None)
                 self._equations[label].append(c)
-                if name == 'left_limit':
-                    self._held[label].add(id(c.expr.args[0]))
         jumps = block.component('jumps')
         if jumps is not None:
             for (b, _), c in jumps.copied.items():
@@ -153,28 +177,21 @@ class Reader:
             self._of_element[n].append(c)
 
     def _read_conditions(self):
-        """Conditions by label, aggregated pairs by element; what these stand for, by name."""
-        block, times = self._block, self._times
-        self._conditions, self._pairs, self._points = defaultdict(list), defaultdict(list), {}
-        for index, c in block.cross.items():
+        """Conditions by label, aggregated pairs by element."""
+        self._conditions, self._pairs = defaultdict(list), defaultdict(list)
+        for index, c in self._block.cross.items():
             self._pairs[index[1]].append(c)
-        meant = ComponentSet(c for conditions in sources(block).values() for c in conditions)
-        found = []
         for c in self._model.component_data_objects(Complementarity, descend_into=Block):
-            label = times.time(c)
+            label = self._times.time(c)
             if label is not None and getattr(c, '_args', None) is not None:
                 self._conditions[label].append(c)
-                found.append(c)
-        # at the right boundary of a Gauss element the pairs name no condition
-        ends = set() if self._grid.right_is_stage else {e.right for e in self._grid.elements}
-        for name, family in times.families(found).items():
-            if any(source(c) in meant for c in family.values()):
-                self._points[name] = {t: c for t, c in family.items() if c.active or t in ends or source(c) in meant}
 
     def first(self, label):
         """The algebraic equations of the first time; conditions hold there as they are."""
         conditions = [c for c in self._conditions[label] if c.active]
-        return self._problem(self._equations[label], {}, [read(c) for c in conditions], conditions, (label,))
+        pairs, families = [read(c) for c in conditions], families_of(self._block)
+        points = {f.name: Points([f.sides[label]], 1, f.continuous) for f in families if label in f.sides}
+        return self._problem(self._equations[label], {}, pairs, points, conditions, (label,))
 
     def element(self, element, limits):
         """What holds in an element.
@@ -188,33 +205,33 @@ class Reader:
         equations = [*(c for t in labels for c in self._equations[t]), *self._of_element[n]]
         pairs = [read(c) for c in self._pairs[n]]
         conditions = [c for t in labels for c in self._conditions[t]]
-        return self._problem(equations, dict(limits), pairs, conditions, labels, self._block.r[n], self._copies[n])
+        points = {f.name: Points.of(f, element, labels) for f in families_of(self._block)}
+        return self._problem(equations, limits, pairs, points, conditions, labels, self._block.r[n], self._copies[n])
 
-    def _problem(self, equations, limits, pairs, conditions, labels, length=None, copies=()):
-        look, points = Look(), self._at(labels)
+    def _problem(self, equations, limits, pairs, points, conditions, labels, length=None, copies=()):
+        look = Look()
         for c in equations:
             # labels are rounded, and so are the coefficients of collocation
             look.at(c.expr, numbers=not c.parent_component().local_name.endswith(DISCRETISATION))
         for expr in (row for rows in limits.values() for row in rows):
             look.at(expr)
-        for expr in (side for some in (pairs, *points.values()) for pair in some for side in pair):
+        for expr in (side for some in (pairs, *(p.pairs for p in points.values())) for pair in some for side in pair):
             look.at(expr)
-        unknown = ComponentSet([*([] if length is None else [length]), *copies])
-        unknown.update(v for v in look.variables if self._determined(v, labels))
-        known = [v for v in look.variables if v not in unknown]
-        places = tuple(v in unknown for v in look.variables)
-        kind = (tuple(look.tokens), places, tuple(map(self.bounds, unknown)), tuple(points), tuple(limits))
-        held = self._held.get(labels[-1], set())
+        unknown = [*([] if length is None else [length]), *copies]
+        chosen = set(map(id, unknown))
+        determined = [id(v) not in chosen and self._determined(v, labels) for v in look.variables]
+        unknown += [v for v, new in zip(look.variables, determined) if new]
+        chosen = set(map(id, unknown))
+        known = [v for v in look.variables if id(v) not in chosen]
+        places = tuple(id(v) in chosen for v in look.variables)
+        bounds, families = tuple(map(self.bounds, unknown)), tuple(p.kind for p in points.values())
+        kind = self._kinds.setdefault((tuple(look.tokens), places, bounds, families, tuple(limits)), len(self._kinds))
         rows = [c.expr for c in equations]
-        return Equations(rows, limits, pairs, points, conditions, labels, length, list(unknown), known, held, kind, self)
-
-    def _at(self, labels):
-        """The conditions at ``labels`` by name; Mixed ones are there as pairs too."""
-        return {name: [read(family[t]) for t in labels if t in family] for name, family in self._points.items()}
+        return Equations(rows, limits, pairs, points, conditions, labels, length, unknown, known, kind, self)
 
     def sides(self, label):
-        """The same at one label."""
-        return {name: pairs[0] for name, pairs in self._at((label,)).items() if pairs}
+        """The conditions at one label, by the name of their family."""
+        return {f.name: f.sides[label] for f in families_of(self._block) if label in f.sides}
 
     def _determined(self, v, labels):
         if self._times.time(v) not in labels or v in self._given:

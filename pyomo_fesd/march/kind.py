@@ -31,18 +31,21 @@ class State:
 
     Attributes
     ----------
-    active : dict name of a condition -> whether its H (else its G) is zero from there on; None if that is not known
+    active : dict name of a condition -> whether its H (else its G) is zero in the element; None if that is not known
+    event : (name, bool) or None
+        the condition whose H (else its G) is zero from there on
     left : array
         values there of all functions of ``kind``, or None
     kind : Kind
-    inside : dict
-        the active set inside the element
+    theta : bytes
+        for each condition whether its G (else its H) is positive in the element, as in eq. (12)
     """
 
     active: dict = None
+    event: tuple = None
     left: np.ndarray = None
     kind: object = None
-    inside: dict = None
+    theta: bytes = None
 
 
 class Kind:
@@ -83,26 +86,29 @@ class Kind:
         """An element of at most the length ``most`` with the active set of ``state``; (length, State) or None."""
         if state.active is None or self._smooth is None:
             return None
-        try:
-            active = np.array([state.active[name] for name in self._smooth.names], dtype=bool)
-        except KeyError:
+        names = self._smooth.names
+        if not state.active.keys() >= set(names):
             return None
+        active = np.array([state.active[name] for name in names], dtype=bool)
+        event = None if state.event is None or state.event[0] not in names else 2 * names.index(state.event[0]) + state.event[1]
         values = self._values if self._values is not None else start()
         with phase(self._timer, 'smooth'):
-            return self._smooth_step(equations, active, self._left(state), most, values)
+            return self._smooth_step(equations, active, self._left(state), most, values, event)
 
     def _left(self, state):
         return state.left if state.kind is self and state.left is not None else self._smooth.nothing
 
-    def _smooth_step(self, equations, active, left, most, values):
+    def _smooth_step(self, equations, active, left, most, values, event=None):
         self._functions.know(known_values(equations))
-        step = self._smooth.step(self._functions.point(values), active, most / self.nominal, left)
+        step = self._smooth.step(self._functions.point(values), active, most / self.nominal, left, event)
         if step is None:
             return None
         self._values = self._functions.values(step.w, values)
         put_out(equations, self._values)
-        active, inside = (dict(zip(self._smooth.names, found.tolist())) for found in (step.active, step.inside))
-        return float(step.length) * self.nominal, State(active, step.end, self, inside)
+        active = dict(zip(self._smooth.names, step.active.tolist()))
+        condition = step.event is not None and step.event < 2 * len(active)
+        event = (self._smooth.names[step.event // 2], step.event % 2) if condition else None
+        return float(step.length) * self.nominal, State(active, event, step.end, self, step.theta)
 
     def window_step(self, equations, most, options):
         """Solve the window; returns what is known of it, and the length."""
@@ -126,8 +132,29 @@ class Kind:
         self.window.put_out(equations)
         if self._smooth is None:
             return h, State()
-        known = dict(zip(self._smooth.names, active.tolist()))
-        return h, State(known, None, self, known)
+        return h, State(dict(zip(self._smooth.names, active.tolist())))
+
+
+def find_first(equations, sides, options, timer):
+    """Find the values of the first time by Newton's method; False if their active set is not clear.
+
+    Parameters
+    ----------
+    equations : Equations
+    sides : dict name -> Pair
+        the conditions there
+    """
+    with phase(timer, 'compile'):
+        functions = Functions(equations, timer, options.get('user_scaling', True))
+    if not functions.complete:
+        return False
+    functions.know(known_values(equations))
+    smooth, before = Smooth(functions, (1.0,)), [v.value for v in equations.unknown]
+    start = functions.point(before)
+    step = smooth.step(start, smooth.guess(start), None, smooth.nothing)
+    if step is not None:
+        put_out(equations, functions.values(step.w, before))
+    return step is not None and active_at_first(sides) is not None
 
 
 def active_at_first(sides):

@@ -21,8 +21,10 @@ from pyomo_fesd.march.accumulation import accumulation
 from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
-from pyomo_fesd.march.kind import Kind, State, active_at_first
-from pyomo_fesd.march.shares import Even, equal_lengths, wanted
+from pyomo_fesd.march.kind import Kind, State, active_at_first, find_first
+from pyomo_fesd.march.prescribed import prescribed_states
+from pyomo_fesd.march.residuals import largest_residuals
+from pyomo_fesd.march.shares import Even, Passed, equal_lengths, wanted
 from pyomo_fesd.march.window import Window
 from pyomo_fesd.mpcc.phase import phase
 from pyomo_fesd.records import records
@@ -31,9 +33,10 @@ from pyomo_fesd.trajectory import physical_time
 
 logger = logging.getLogger('pyomo_fesd')
 
-#: A step shorter than this part of its share is none.
+#: Parts of an element's length, or of its share if that is longer: what is left of a stage after a switch may be as short as the
+#: solver's tolerances.  A step shorter than this is none.
 NO_STEP = 1e-9
-#: A step that is shorter than its share by more than this part has been cut short by an event.
+#: A step that is shorter than its share by more than this has been cut short by an event.
 CUT = 1e-7
 #: Lengths between two switches are equal if they differ by less than this part; what is left after so many marches may be larger.
 EQUAL, NEARLY, PASSES = 1e-11, 1e-7, 6
@@ -59,12 +62,13 @@ class March:
         self._memories = [Memory([m for m in modes if m.system == s], self._block.component('memory')) for s in systems]
         self._jumps = Jumps(jumps, self._block.component('jumps'))
         self._reader = Reader(model, self._block, self._grid, self._times, self._given(inputs))
-        self._equations, self._kinds, self._state = {}, {}, State()
+        self._equations, self._kinds, self._state, self._passed = {}, {}, State(), {}
         self._time, self._events = float(wrt.first()), {}
 
     def _given(self, inputs):
         """Inputs, controls that are held on each stage, and weights of modes with memory."""
         given = ComponentSet(v for u in inputs for v in u.values())
+        given.update(prescribed_states(self._model, self._wrt))
         for row in self._block.held.values():
             # the value at the end of its stage counts
             *others, last = sorted(variables_of([row.body]), key=self._times.time)
@@ -98,7 +102,7 @@ class March:
 
     def _equalise(self):
         """March with equal lengths between switches until they fit; returns whether they do."""
-        equal, differs = equal_lengths(self._block, self._grid)
+        equal, differs = equal_lengths(self._block, self._grid, self._passed)
         for _ in range(PASSES):
             if differs <= EQUAL:
                 return True
@@ -107,7 +111,7 @@ class March:
                     return False
             except FesdError:
                 return False
-            before, (equal, differs) = equal, equal_lengths(self._block, self._grid)
+            before, (equal, differs) = equal, equal_lengths(self._block, self._grid, self._passed)
             if equal.last != before.last:
                 return False
         return differs <= NEARLY
@@ -127,11 +131,11 @@ class March:
         equations = self._reader.first(first)
         states = [d.get_state_var() for d in derivatives(self._model, self._wrt)]
         refuse_free_start(equations, [v for x in states for v in x.values() if self._times.time(v) == first and not v.fixed])
-        if equations.unknown:
+        if equations.unknown and not find_first(equations, self._reader.sides(first), self._options, self._timer):
             with phase(self._timer, 'compile'):
                 window = Window(equations, self._options)
             with phase(self._timer, 'window'):
-                self._require(window.solve(equations))
+                self._require(window.solve(equations), equations, window)
             window.put_out(equations)
 
     def _through(self, shares):
@@ -154,13 +158,15 @@ class March:
             for left, element in zip(range(len(elements), 0, -1), elements):
                 share = shares.most(element, rest, left, len(self._events[stage]))
                 h, happened = self._advance(element, share, warm)
-                cut = h < share * (1 - CUT)
+                self._passed[element.n] = Passed(self._state.theta, bool(happened))
+                least = CUT * max(share, element.length)
+                cut = h < share - least
                 # after a switch another active set holds
                 warm = bool(happened) or not cut
                 rest, self._time = rest - h, self._time + h
                 if cut or happened:
                     self._events[stage].append((self._time, ', '.join(happened) or 'switch'))
-                if (rest <= CUT * share) != (left == 1):
+                if (rest <= least) != (left == 1):
                     return stage
         for memory in self._memories:
             memory.settle(self._grid, first)
@@ -199,8 +205,9 @@ class March:
             self._kinds[equations.kind] = Kind(equations, element, self._grid, self._options, self._timer)
         kind = self._kinds[equations.kind]
         found = kind.smooth_step(equations, self._state, most, lambda: self._values_before(equations, element))
-        h, state = self._by_window(kind, equations, most, warm) if found is None else found
-        h = most if h > most * (1 - CUT) else h
+        longest = max(most, element.length)
+        h, state = self._by_window(kind, equations, most, warm, NO_STEP * longest) if found is None else found
+        h = most if h > most - CUT * longest else h
         self._block.r[element.n].set_value(h / element.length, skip_validation=True)
         return h, state
 
@@ -208,22 +215,30 @@ class March:
         """Values of the unknowns of an element as they are on its left."""
         return [_value_at(self._times, v, element.left) if self._times.time(v) is not None else v.value for v in equations.unknown]
 
-    def _by_window(self, kind, equations, most, warm):
-        """Where the next active set is not known, or does not hold."""
+    def _by_window(self, kind, equations, most, warm, least):
+        """Where the next active set is not known, or does not hold: a step longer than ``least``."""
         for options in TRIES[not warm :]:
             answer, h = kind.window_step(equations, most, options)
-            if answer.stationarity == 'B' and h > NO_STEP * most:
+            if answer.stationarity == 'B' and h > least:
                 return kind.take_window(equations, most, h)
-        self._require(answer)
+        kind.window.force(equations, most / kind.nominal)
+        missed = largest_residuals(self._model, self._times, equations, kind.window.values)
+        forced = f"; where one is forced, {missed}" if missed else ''
+        if answer.stationarity == 'B':
+            raise self._stuck(
+                f"no step is possible from time {self._time:.6g}{forced}",
+                "look for a bound that the solution reaches there, or for a state from which no mode leads on",
+            )
         raise self._stuck(
-            f"no step is possible from time {self._time:.6g}",
-            "look for a bound that the solution reaches there, or for a state from which no mode leads on",
+            f"no step was found from time {self._time:.6g}: {answer.reason or answer.outcome}{forced}",
+            "check the equations there; more elements help where the solution is steep",
         )
 
     def _problem(self, element):
         if element.n not in self._equations:
-            limits = {name: rows for law in (*self._memories, self._jumps) for name, rows in law.limits(element).items()}
-            self._equations[element.n] = self._reader.element(element, limits)
+            with phase(self._timer, 'read'):
+                limits = {name: rows for law in (*self._memories, self._jumps) for name, rows in law.limits(element).items()}
+                self._equations[element.n] = self._reader.element(element, limits)
         return self._equations[element.n]
 
     def _warn_short(self):
@@ -236,17 +251,18 @@ class March:
                 if 0 < b - a < least * (1 - CUT):
                     logger.warning(
                         "simulate: from time %.6g to %.6g there is less time between two switches than the least element length "
-                        "%.3g, so mpec_hybrid will not find this solution. Take more elements (nfe) or a larger length_bounds.",
+                        "%.3g, so mpec_hybrid will not find this solution. Take more elements (nfe).",
                         a,
                         b,
                         least,
                     )
 
-    def _require(self, answer):
+    def _require(self, answer, equations, window):
         if answer.stationarity != 'B':
+            missed = largest_residuals(self._model, self._times, equations, window.values)
             raise self._stuck(
-                f"no solution at time {self._time:.6g}: {answer.reason}",
-                "check the equations there; more elements help where the solution is steep",
+                f"no solution at time {self._time:.6g}: {missed or answer.reason or answer.outcome}",
+                "check the equations there, and the initial values",
             )
 
     def _stuck(self, cause, fix):

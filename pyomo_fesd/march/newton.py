@@ -40,12 +40,12 @@ class System:
     def __init__(self, functions, vanishing, columns, event=None):
         self._functions, self._vanishing, self._columns, self._event = functions, vanishing, columns, event
         self.shape = m, n = len(vanishing) + (event is not None), len(columns)
-        row, column = np.full(functions.differentiated, -1), np.full(functions.lower.size, -1)
+        row, column = np.full(functions.V.size, -1), np.full(functions.lower.size, -1)
         row[vanishing], column[columns] = np.arange(len(vanishing)), np.arange(n)
         i, j, weights = row[functions.rows], column[functions.columns], np.ones(functions.rows.size)
         source = np.arange(functions.rows.size)
         if event is not None:
-            factor = np.zeros(functions.differentiated)
+            factor = np.zeros(functions.V.size)
             factor[event[0]] = event[1]
             last = factor[functions.rows]
             i, j = np.concatenate([i, np.where(last != 0, m - 1, -1)]), np.concatenate([j, j])

@@ -7,7 +7,7 @@ Then the switches are known, and elements between two of them can be equal, as s
 
 where t_switch depends on h by the error of the discretisation only; so a few marches find both.
 
-Takes: a march that is through, with eta (eq. 12) on the block of the grid.
+Takes: a march that is through, and where it has switched.
 Leaves: nothing.
 Does not apply: where step equilibration is switched off.
 """
@@ -66,11 +66,21 @@ class Equal:
         """The length to aim at; elements that end at a switch have room."""
         return rest / left if left == 1 else self.lengths[element.n] * (ROOM if element.n in self.last else 1)
 
-    def differs(self, found):
-        """Largest relative difference to other lengths; infinite if the switches are elsewhere."""
-        if self.last != found.last:
-            return float('inf')
-        return max(abs(h - found.lengths[n]) / h for n, h in self.lengths.items())
+
+@dataclass(frozen=True)
+class Passed:
+    """What a march tells of an element.
+
+    Attributes
+    ----------
+    theta : bytes or None
+        the active set, as step equilibration sees it
+    ends : bool
+        whether a mode with memory ends at its right boundary, or a state jumps there
+    """
+
+    theta: bytes
+    ends: bool
 
 
 def wanted(block):
@@ -79,15 +89,27 @@ def wanted(block):
     return pairs is not None and any(pair.active for pair in pairs.values())
 
 
-def equal_lengths(block, grid):
-    """The ``Equal`` lengths that belong to the values in the model, and how much those differ from them."""
+def equal_lengths(block, grid, passed):
+    """The ``Equal`` lengths that belong to a march, and how much those of the march differ from them.
+
+    Parameters
+    ----------
+    passed : dict element number -> Passed
+    """
     lengths, last, differs = {}, set(), 0.0
     for elements in grid.stages.values():
         found = [e.length * block.r[e.n].value for e in elements]
-        ends = [k for k, e in enumerate(elements[:-1], start=1) if not value(block.eta[e.n]) > UNCHANGED]
+        ends = [k for k, e in enumerate(elements[:-1], start=1) if _switches(block, passed, e.n)]
         last.update(elements[k - 1].n for k in ends)
         for a, b in zip([0, *ends], [*ends, len(elements)]):
             h = sum(found[a:b]) / (b - a)
             differs = max(differs, *(abs(x - h) / h for x in found[a:b]))
             lengths.update((e.n, h) for e in elements[a:b])
     return Equal(lengths, last), differs
+
+
+def _switches(block, passed, n):
+    before, after = passed[n], passed[n + 1]
+    if before.ends or before.theta is None or after.theta is None:
+        return before.ends or not value(block.eta[n]) > UNCHANGED
+    return before.theta != after.theta
