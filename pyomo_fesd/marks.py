@@ -24,8 +24,8 @@ TENTATIVE          Complementarity (data)    ``True``: one of those DECIDED that
 MOVE               Expression (data)         what changes together, as (component, value): of a pair, another pair whose zero side
                                              it may take over, or None if its first side may become zero; of a Var, where the move
                                              starts it, or ``True``: worth a look only where it is at its lower bound
-ARTIFICIAL         Var                       its upper bound in the homotopy; its bounds are the method's, not the plant's, and a
-                                             certificate looks beyond them
+ARTIFICIAL         Var                       its bounds (low, high) in the homotopy; all its bounds are the method's, not the
+                                             plant's, and a certificate looks beyond them
 PENALTY            Expression                its weight rho; guides the homotopy, never part of the reported objective
 =================  ========================  ===========================================================================
 """

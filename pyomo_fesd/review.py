@@ -2,6 +2,7 @@
 
 import logging
 
+from pyomo_fesd.collapsed import collapsed
 from pyomo_fesd.excursions import excursions
 from pyomo_fesd.records import records
 from pyomo_fesd.switching import switching_functions
@@ -10,7 +11,7 @@ from pyomo_fesd.uniqueness import not_unique
 logger = logging.getLogger('pyomo_fesd')
 
 #: What is looked for: functions ``(model, wrt, switching functions)`` that give messages.
-LOOKS = (not_unique, excursions)
+LOOKS = (not_unique, excursions, collapsed)
 
 
 def review(model):

@@ -17,7 +17,7 @@ import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.contrib.incidence_analysis import IncidenceMethod, get_incident_variables
 from pyomo.contrib.incidence_analysis.dulmage_mendelsohn import dulmage_mendelsohn
-from pyomo.core import Block, Constraint, Objective, Var
+from pyomo.core import Block, Constraint, Objective, Var, value
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
 from scipy.sparse import coo_matrix
@@ -32,6 +32,8 @@ from pyomo_fesd.timeindex import TimeIndex
 
 #: Names that a message lists.
 SHOWN = 3
+#: Fixed values may miss an equation between them by this much, as in Pyomo's NL writer.
+CONTRADICTION = 1e-8
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,7 @@ def structure(block):
     for i, (_, expressions) in enumerate(equations):
         found = ComponentSet(v for e in expressions for v in _variables(e))
         places.extend((i, unknowns.setdefault(v, len(unknowns))) for v in found if v not in given)
-    used = sorted({i for i, _ in places})
+    used = sorted({i for i, _ in places} | {i for i, (c, _) in enumerate(equations) if _contradicts(c)})
     equations, row = [equations[i][0] for i in used], {i: k for k, i in enumerate(used)}
     matrix = _incidence([(row[i], j) for i, j in places], (len(equations), len(unknowns)))
     has_objective = any(True for _ in block.component_data_objects(Objective, active=True, descend_into=Block))
@@ -140,6 +142,13 @@ def _equations(block, summed):
     conditions = block.component_data_objects(Complementarity, descend_into=Block)
     asked = (c for c in conditions if (c.active or source(c) in summed) and replacement(c) is None)
     return found + [(c, _sides(c)) for c in asked]
+
+
+def _contradicts(equation):
+    """Whether an equation between fixed values alone does not hold; with unknowns it is asked for anyway."""
+    if equation.ctype is not Constraint or any(True for _ in identify_variables(equation.body, include_fixed=False)):
+        return False
+    return abs(value(equation.body) - value(equation.upper)) > CONTRADICTION
 
 
 def _sides(condition):

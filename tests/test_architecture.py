@@ -32,8 +32,18 @@ def test_the_march_looks_at_elements_and_nothing_looks_at_the_march():
     for path in (PACKAGE / 'march').glob('*.py'):
         others = set(imports(path)) - compiles
         assert not [n for n in others if n.startswith(('pyomo_fesd.dcs', 'pyomo_fesd.mpcc', 'pyomo_fesd.solver'))], path
-    others = (p for p in PACKAGE.rglob('*.py') if p.parent.name != 'march')
+    others = (p for p in PACKAGE.rglob('*.py') if p.parent.name not in ('march', 'accuracy'))
     assert [p for p in others if any(n.startswith('pyomo_fesd.march') for n in imports(p))] == [PACKAGE / '__init__.py']
+
+
+def test_accuracy_control_calls_the_transformation_the_solver_and_the_march_as_a_user_does():
+    for path in (PACKAGE / 'accuracy').glob('*.py'):
+        found = [
+            n for n in imports(path) if n.startswith(('pyomo_fesd.dcs', 'pyomo_fesd.mpcc', 'pyomo_fesd.solver', 'pyomo_fesd.march'))
+        ]
+        assert set(found) <= {'pyomo_fesd.march.simulate'}, path
+    others = (p for p in PACKAGE.rglob('*.py') if p.parent.name != 'accuracy')
+    assert [p for p in others if any(n.startswith('pyomo_fesd.accuracy') for n in imports(p))] == [PACKAGE / '__init__.py']
 
 
 def test_only_the_solvers_import_mpcc():
@@ -55,6 +65,7 @@ def test_public_names():
         'plot',
         'positive_part',
         'projection',
+        'refine',
         'report',
         'simulate',
         'state_jump',

@@ -134,9 +134,7 @@ OSCILLATOR = System(
     exact=OSCILLATOR_LINEAR.exact,
 )
 
-SENSITIVITY = replace(
-    SIGNUM, name='sensitivity', x0=(-1.0,), step=1e-3, exact={'sensitivity': 1 / 3}
-)
+SENSITIVITY = replace(SIGNUM, name='sensitivity', x0=(-1.0,), step=1e-3, exact={'sensitivity': 1 / 3})
 
 # int_0^2 x^2 dt + (x(2) - 5/3)^2 over x0; the integral is a state
 FALSE_MINIMA = System(

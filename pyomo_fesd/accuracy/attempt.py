@@ -6,7 +6,7 @@ A clone would do no better: rules that close over the model (``lambda d, t: m.x[
 import logging
 from contextlib import ExitStack, contextmanager
 
-from pyomo.core import BooleanVar, Block, Var
+from pyomo.core import Block, BooleanVar, Var
 from pyomo.dae import DerivativeVar
 from pyomo.gdp import Disjunct
 
@@ -66,7 +66,9 @@ def _warnings_held_back(now):
 def _remember_values(model):
     """Values, stale flags and what is fixed; the discretisation looks only after those that it touches itself."""
     # the binaries of indicators come last: they set the Booleans
-    found = [v for ctype in (BooleanVar, DerivativeVar, Var) for v in model.component_data_objects(ctype, descend_into=(Block, Disjunct))]
+    found = [
+        v for ctype in (BooleanVar, DerivativeVar, Var) for v in model.component_data_objects(ctype, descend_into=(Block, Disjunct))
+    ]
     known = [(v, v.value, v.stale, v.fixed) for v in found]
 
     def restore():

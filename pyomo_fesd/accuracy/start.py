@@ -6,13 +6,16 @@ polynomials.
 
 Takes: a model on its new grid, and the ``Solution``.
 Leaves: values of all variables over time, of the element lengths, and of variables without time.
-Does not apply: to what stands at element boundaries only (modes with memory, jumps): these keep their initial values.
+Does not apply: to what stands at element boundaries only (modes with memory, jumps); there a simulation with the old controls is
+the start, if it comes to its end.
 """
 
 import numpy as np
 from pyomo.core import Block, Var
 
 from pyomo_fesd.elements.cross import grid_of
+from pyomo_fesd.errors import FesdError
+from pyomo_fesd.march.simulate import simulate
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex
 
@@ -39,6 +42,16 @@ def start_from(model, wrt, solution):
             for label, found in zip(labels, solution.inside(name, piece, at)):
                 if label in family:
                     _set(family[label], found)
+    if block.component('memory') is not None or block.component('jumps') is not None:
+        _simulate(model, wrt)
+
+
+def _simulate(model, wrt):
+    try:
+        simulate(model, wrt)
+    except FesdError:
+        # the values up to there are a start too
+        return
 
 
 def _set(v, found):

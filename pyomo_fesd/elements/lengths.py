@@ -15,6 +15,9 @@ from pyomo_fesd.errors import FesdError
 from pyomo_fesd.marks import ARTIFICIAL, mark
 from pyomo_fesd.timeindex import TimeIndex, derivatives
 
+#: The least r_n of a solution: as short as tolerances let one be told from none.
+LEAST = 1e-6
+
 
 def add_lengths(block, grid, gamma, factors=None):
     """Declare r_n and the length of every control stage; sigma of each element if there are ``factors`` (by stage).
@@ -22,15 +25,16 @@ def add_lengths(block, grid, gamma, factors=None):
     Leaves ``block.element`` (1..N), ``block.stage``, ``block.r`` and ``block.stage_length``: sum_n hbar_n r_n = nominal length of
     the stage (eq. 10).  A stage of one element has no freedom.
 
-    The lower bound r_n >= 1 - gamma keeps an element from collapsing into a point, where any multiplier would do.  The upper
-    bound r_n <= 1 + gamma shares the elements out evenly between the switches while the homotopy decides; it is marked for that
-    only, because once the number of elements before a switch is settled it limits where the switch can be, and problems with
-    free switches get false minima from it.
+    The lower bound r_n >= LEAST keeps an element from collapsing into a point, where any multiplier would do.  The bounds
+    1 - gamma <= r_n <= 1 + gamma share the elements out evenly between the switches while the homotopy decides; they are marked
+    for that only, because once the number of elements before a switch is settled they limit where the switch can be: problems with
+    free switches get false minima from the upper one, and a switch close to another one, to the start or to a boundary of a stage
+    is out of reach of the lower one.
     """
     block.element = RangeSet(len(grid.elements))
     block.stage = Set(initialize=list(grid.stages), ordered=True)
-    block.r = Var(block.element, bounds=(1 - gamma, None), initialize=1)
-    mark(block, ARTIFICIAL, block.r, 1 + gamma)
+    block.r = Var(block.element, bounds=(LEAST, None), initialize=1)
+    mark(block, ARTIFICIAL, block.r, (1 - gamma, 1 + gamma))
     if factors is not None:
         block.sigma = Expression(block.element, initialize={e.n: factors[e.stage - 1] for e in grid.elements})
 

@@ -1,4 +1,4 @@
-"""Space comes first: a second ContinuousSet that is still waiting for its points would bring equations with elements that cannot move.
+"""Space comes first: a second ContinuousSet that still waits for its points would bring equations whose elements cannot move.
 
 Takes: a model and its ContinuousSet of time.
 Leaves: nothing.

@@ -58,6 +58,14 @@ def _lengths(arg):
     return None if arg is None else list(arg.values() if hasattr(arg, 'values') else arg)
 
 
+def _holder(block, wrt):
+    """``block``, or the block of a time that stands above it (a flowsheet within a flowsheet): all over one time moves together."""
+    parent = wrt.parent_block()
+    while parent is not None and parent is not block:
+        parent = parent.parent_block()
+    return wrt.parent_block() if parent is None else block
+
+
 def _active_disjunctions(block, wrt):
     times = TimeIndex(wrt)
     found = block.component_data_objects(Disjunction, active=True, descend_into=Block)
@@ -131,7 +139,7 @@ class FiniteElements(Transformation):
         ConfigValue(
             default=0.9,
             domain=_gamma,
-            description="gamma of eq. (10): |h_n - hbar_n| <= gamma hbar_n in the homotopy; the branch keeps the lower bound only",
+            description="gamma of eq. (10): |h_n - hbar_n| <= gamma hbar_n in the homotopy; a branch has shorter and longer ones",
         ),
     )
     CONFIG.declare(
@@ -174,6 +182,7 @@ class FiniteElements(Transformation):
         config = self.CONFIG(kwds.pop('options', {}))
         config.set_value(kwds)
         wrt = find_continuous_set(instance, config.wrt, 'fesd.finite_elements')
+        instance = _holder(instance, wrt)
         self._check(instance, wrt, config)
         with restored_on_error(instance, wrt), PauseGC():
             stages, times = self._discretise(instance, wrt, config), TimeIndex(wrt)

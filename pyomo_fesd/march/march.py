@@ -22,6 +22,8 @@ from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
 from pyomo_fesd.march.kind import Kind, State, active_at_first, find_first
+from pyomo_fesd.march.prescribed import prescribed_states
+from pyomo_fesd.march.residuals import largest_residuals
 from pyomo_fesd.march.shares import Even, Passed, equal_lengths, wanted
 from pyomo_fesd.march.window import Window
 from pyomo_fesd.mpcc.phase import phase
@@ -31,9 +33,10 @@ from pyomo_fesd.trajectory import physical_time
 
 logger = logging.getLogger('pyomo_fesd')
 
-#: A step shorter than this part of its share is none.
+#: Parts of an element's length, or of its share if that is longer: what is left of a stage after a switch may be as short as the
+#: solver's tolerances.  A step shorter than this is none.
 NO_STEP = 1e-9
-#: A step that is shorter than its share by more than this part has been cut short by an event.
+#: A step that is shorter than its share by more than this has been cut short by an event.
 CUT = 1e-7
 #: Lengths between two switches are equal if they differ by less than this part; what is left after so many marches may be larger.
 EQUAL, NEARLY, PASSES = 1e-11, 1e-7, 6
@@ -65,6 +68,7 @@ class March:
     def _given(self, inputs):
         """Inputs, controls that are held on each stage, and weights of modes with memory."""
         given = ComponentSet(v for u in inputs for v in u.values())
+        given.update(prescribed_states(self._model, self._wrt))
         for row in self._block.held.values():
             # the value at the end of its stage counts
             *others, last = sorted(variables_of([row.body]), key=self._times.time)
@@ -131,7 +135,7 @@ class March:
             with phase(self._timer, 'compile'):
                 window = Window(equations, self._options)
             with phase(self._timer, 'window'):
-                self._require(window.solve(equations))
+                self._require(window.solve(equations), equations, window)
             window.put_out(equations)
 
     def _through(self, shares):
@@ -155,13 +159,14 @@ class March:
                 share = shares.most(element, rest, left, len(self._events[stage]))
                 h, happened = self._advance(element, share, warm)
                 self._passed[element.n] = Passed(self._state.theta, bool(happened))
-                cut = h < share * (1 - CUT)
+                least = CUT * max(share, element.length)
+                cut = h < share - least
                 # after a switch another active set holds
                 warm = bool(happened) or not cut
                 rest, self._time = rest - h, self._time + h
                 if cut or happened:
                     self._events[stage].append((self._time, ', '.join(happened) or 'switch'))
-                if (rest <= CUT * share) != (left == 1):
+                if (rest <= least) != (left == 1):
                     return stage
         for memory in self._memories:
             memory.settle(self._grid, first)
@@ -200,8 +205,9 @@ class March:
             self._kinds[equations.kind] = Kind(equations, element, self._grid, self._options, self._timer)
         kind = self._kinds[equations.kind]
         found = kind.smooth_step(equations, self._state, most, lambda: self._values_before(equations, element))
-        h, state = self._by_window(kind, equations, most, warm) if found is None else found
-        h = most if h > most * (1 - CUT) else h
+        longest = max(most, element.length)
+        h, state = self._by_window(kind, equations, most, warm, NO_STEP * longest) if found is None else found
+        h = most if h > most - CUT * longest else h
         self._block.r[element.n].set_value(h / element.length, skip_validation=True)
         return h, state
 
@@ -209,16 +215,23 @@ class March:
         """Values of the unknowns of an element as they are on its left."""
         return [_value_at(self._times, v, element.left) if self._times.time(v) is not None else v.value for v in equations.unknown]
 
-    def _by_window(self, kind, equations, most, warm):
-        """Where the next active set is not known, or does not hold."""
+    def _by_window(self, kind, equations, most, warm, least):
+        """Where the next active set is not known, or does not hold: a step longer than ``least``."""
         for options in TRIES[not warm :]:
             answer, h = kind.window_step(equations, most, options)
-            if answer.stationarity == 'B' and h > NO_STEP * most:
+            if answer.stationarity == 'B' and h > least:
                 return kind.take_window(equations, most, h)
-        self._require(answer)
+        kind.window.force(equations, most / kind.nominal)
+        missed = largest_residuals(self._model, self._times, equations, kind.window.values)
+        forced = f"; where one is forced, {missed}" if missed else ''
+        if answer.stationarity == 'B':
+            raise self._stuck(
+                f"no step is possible from time {self._time:.6g}{forced}",
+                "look for a bound that the solution reaches there, or for a state from which no mode leads on",
+            )
         raise self._stuck(
-            f"no step is possible from time {self._time:.6g}",
-            "look for a bound that the solution reaches there, or for a state from which no mode leads on",
+            f"no step was found from time {self._time:.6g}: {answer.reason or answer.outcome}{forced}",
+            "check the equations there; more elements help where the solution is steep",
         )
 
     def _problem(self, element):
@@ -238,17 +251,18 @@ class March:
                 if 0 < b - a < least * (1 - CUT):
                     logger.warning(
                         "simulate: from time %.6g to %.6g there is less time between two switches than the least element length "
-                        "%.3g, so mpec_hybrid will not find this solution. Take more elements (nfe) or a larger length_bounds.",
+                        "%.3g, so mpec_hybrid will not find this solution. Take more elements (nfe).",
                         a,
                         b,
                         least,
                     )
 
-    def _require(self, answer):
+    def _require(self, answer, equations, window):
         if answer.stationarity != 'B':
+            missed = largest_residuals(self._model, self._times, equations, window.values)
             raise self._stuck(
-                f"no solution at time {self._time:.6g}: {answer.reason}",
-                "check the equations there; more elements help where the solution is steep",
+                f"no solution at time {self._time:.6g}: {missed or answer.reason or answer.outcome}",
+                "check the equations there, and the initial values",
             )
 
     def _stuck(self, cause, fix):

@@ -110,6 +110,8 @@ class Branches:
     def search(self, *starts):
         """Look for any feasible branch: by the LPEC with every pair as a binary, and depth first over the pairs."""
         self.forget()
+        # it would find branches in which collapsed elements hide what is wrong
+        self._c.narrow()
         for w in starts:
             step = self._steps.suggestion(w, active_sets(*self._sides(w), np.inf), FAR)
             if step.solved and self._found(w + step.d, step.zero):

@@ -36,7 +36,7 @@ class Numbers:
     lbg, ubg : arrays (m)
     side_of : int array (2q), equal numbers for equal sides among G (first q) and H
     artificial : bool array (n), variables whose bounds belong to the method
-    guide_ubx : array (n), upper bounds in the homotopy: those of such variables are tighter there
+    guide_lbx, guide_ubx : arrays (n), bounds in the homotopy: those of such variables are tighter there
     x0 : array (n), the model's values projected to the bounds
     parameters : array (l), values of the parameters that a new solve may change
     missing : int, number of variables without a value
@@ -53,6 +53,7 @@ class Numbers:
     ubg: np.ndarray
     side_of: np.ndarray
     artificial: np.ndarray
+    guide_lbx: np.ndarray
     guide_ubx: np.ndarray
     x0: np.ndarray
     parameters: np.ndarray
@@ -95,8 +96,8 @@ class Compiled:
 
     Parameters
     ----------
-    graph : casadi Function
-        (w, p) -> f, penalty, g (m), G, H (q), eta, equal (one each decision)
+    x, p : SX, symbols of the variables w (n) and of the parameters (l)
+    outputs : list of SX, in terms of these: f, penalty, g (m), G, H (q), eta, equal (one each decision)
     numbers : Numbers
     variables : list of VarData, length n
     constraints : list of ConstraintData, length m (rows of g)
@@ -112,13 +113,13 @@ class Compiled:
 
     NAMES = ('f', 'penalty', 'g', 'G', 'H', 'eta', 'equal')
 
-    def __init__(self, graph, numbers, variables=(), constraints=(), conditions=(), decisions=(), source=None):
-        self._graph, self._numbers = graph, numbers
+    def __init__(self, x, p, outputs, numbers, variables=(), constraints=(), conditions=(), decisions=(), source=None):
+        self._numbers = numbers
         self.__dict__.update(vars(numbers))
         self.variables, self.constraints, self.conditions, self.decisions = variables, constraints, conditions, decisions
         self._source = source
-        self.x, self.p = ca.SX.sym('w', graph.size1_in(0)), ca.SX.sym('p', graph.size1_in(1))
-        for name, expression in zip(self.NAMES, graph(self.x, self.p)):
+        self.x, self.p = x, p
+        for name, expression in zip(self.NAMES, outputs):
             setattr(self, name, expression)
         self._values = ca.Function('values', [self.x, self.p], [self.f, self.g, self.G, self.H, self.eta])
 
@@ -132,15 +133,28 @@ class Compiled:
         return ca.Function('gradients', [self.x, self.p], [self.derivatives.f, *self.derivatives.parts])
 
     def __getstate__(self):
-        return self._graph, self._numbers
+        # casadi pickles functions, not expressions
+        outputs = [getattr(self, name) for name in self.NAMES]
+        return ca.Function('mpcc', [self.x, self.p], outputs), self._numbers
 
     def __setstate__(self, state):
-        self.__init__(*state)
+        graph, numbers = state
+        x, p = ca.SX.sym('w', graph.size1_in(0)), ca.SX.sym('p', graph.size1_in(1))
+        self.__init__(x, p, graph(x, p), numbers)
 
     def refresh(self):
         """Read bounds, start and parameters from the model again; see ``Source.read``."""
         self._numbers = replace(self._numbers, **self._source.read())
         self.__dict__.update(vars(self._numbers))
+
+    def narrow(self):
+        """Where bounds belong to the method, a branch has the lower ones of the homotopy, too."""
+        self.lbx = self.guide_lbx
+
+    def widen(self):
+        """Undo ``narrow``; returns whether that makes a difference."""
+        narrow, self.lbx = self.lbx, self._numbers.lbx
+        return bool((narrow > self.lbx).any())
 
     @property
     def nonzeros(self):

@@ -57,12 +57,17 @@ class HybridSolver:
     def solve(self):
         """Run to a certified point or an honest end; returns the ``Run``."""
         run = self.run
+        if not self._options.warm_start:
+            # short elements have more solutions than those that are meant; where these do not do, the path widens
+            self._c.narrow()
         try:
             run.outcome = MODES[self._options.mode](self)
         except Stop as stop:
             run.outcome = stop.outcome
         except KeyboardInterrupt:
             run.outcome = Outcome.INTERRUPTED
+        finally:
+            self._c.widen()
         if run.point is not None:
             run.w = run.point.w
         return run

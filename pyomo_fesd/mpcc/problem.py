@@ -73,8 +73,8 @@ class Mpcc:
         conditions l <= B <= u perp F, split into two pairs with two auxiliary variables when compiled
     decisions : list of Decision
     penalties : list of (Expression, float)
-    artificial : ComponentMap Var -> float
-        variables whose bounds belong to the method, with their upper bound in the homotopy
+    artificial : ComponentMap Var -> (low, high)
+        variables whose bounds belong to the method, with those that they have in the homotopy
     moves : list of lists of (component, value)
         marks MOVE
     objective : ObjectiveData or None

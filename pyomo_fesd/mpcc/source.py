@@ -28,7 +28,7 @@ class Source:
     variables : list of VarData (n)
     parameters : list of VarData and ParamData
     sides : bool array (n), variables that are sides of pairs, so never negative
-    guide : array (n), upper bounds in the homotopy of variables whose bounds belong to the method, elsewhere infinite
+    guide : array (n, 2), bounds in the homotopy of variables whose bounds belong to the method, elsewhere infinite
     scale : array (n)
     splits : list of (VarData, VarData, expression)
         auxiliary variables that start at the positive and the negative part of an expression
@@ -65,8 +65,9 @@ class Source:
         return {
             'lbx': lower * self.scale,
             'ubx': upper * self.scale,
-            'guide_ubx': np.maximum(lower, np.minimum(upper, self.guide)) * self.scale,
-            'artificial': np.isfinite(self.guide) & ~fixed,
+            'guide_lbx': np.minimum(upper, np.maximum(lower, self.guide[:, 0])) * self.scale,
+            'guide_ubx': np.maximum(lower, np.minimum(upper, self.guide[:, 1])) * self.scale,
+            'artificial': np.isfinite(self.guide).any(axis=1) & ~fixed,
             'x0': np.clip(start, lower, upper) * self.scale,
             'parameters': parameter_values(self.parameters),
             'missing': missing,

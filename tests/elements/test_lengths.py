@@ -192,3 +192,15 @@ def test_a_second_backward_difference_joins_two_elements_and_is_refused():
     m.ground = Disjunction(m.t, rule=lambda m, t: [[m.q[t] >= 0.5, m.ddq[t] == -1], [m.q[t] <= 0.5, m.ddq[t] == -0.25]])
     with pytest.raises(FesdError, match='ddq'):
         move(dcs(m))
+
+
+@pytest.mark.parametrize('late', [-1e-2, -1e-4, 1e-3])
+def test_a_switch_nearer_to_a_stage_boundary_than_length_bounds_allow(late):
+    """The path with elements of a tenth and more ends in nothing feasible; shorter ones come second."""
+    m = crossing.build()
+    m.t.add(0.5 - late)
+    m.t.add(1)
+    run(m, 12, 2)
+    (switch,) = pyomo_fesd.switches(m)
+    assert switch.time == pytest.approx(crossing.SWITCH, abs=1e-8)
+    assert pyomo_fesd.element_lengths(m)['length'].min() < 0.1 * min(0.5 - late, 0.5 + late) / 4

@@ -31,9 +31,7 @@ def rod():
 
 
 def add_friction(m):
-    m.friction = Disjunction(
-        m.t, m.x, rule=lambda m, t, x: [[m.u[t, x] >= 0, m.ut[t, x] == -1], [m.u[t, x] <= 0, m.ut[t, x] == 1]]
-    )
+    m.friction = Disjunction(m.t, m.x, rule=lambda m, t, x: [[m.u[t, x] >= 0, m.ut[t, x] == -1], [m.u[t, x] <= 0, m.ut[t, x] == 1]])
     return m
 
 

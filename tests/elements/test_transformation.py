@@ -8,6 +8,7 @@ import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 import signum
+from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
@@ -194,7 +195,7 @@ def test_a_keyword_that_cannot_be_meant_is_refused(keywords):
     assert seen(m) == before
 
 
-def test_no_element_becomes_shorter_than_length_bounds_say():
+def test_no_element_becomes_shorter_than_length_bounds_say_where_that_will_do():
     m = run(signum.build(), nfe=10, length_bounds=0.5)
     assert min(lengths(m)) >= 0.5 * 0.2 - 1e-9
     assert switch_time(m) == pytest.approx(2 / 3, abs=1e-9)
@@ -251,6 +252,28 @@ def refused(m, message, **keywords):
         move(m, **keywords)
     assert seen(m) == before
     assert 'Fix:' in str(error.value)
+
+
+@pytest.mark.parametrize('discretised', [False, True])
+def test_all_over_one_time_moves_together_whichever_block_is_asked(discretised):
+    """The time stands above two blocks; elements are asked for on one of them, both have their switch."""
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 2))
+    for name, start in (('one', -1.0), ('two', -2.0)):
+        b = pyo.Block()
+        m.add_component(name, b)
+        b.x = pyo.Var(m.t, initialize=start)
+        b.dx = dae.DerivativeVar(b.x)
+        b.x[0].fix(start)
+    if discretised:
+        pyo.TransformationFactory('dae.collocation').apply_to(m, wrt=m.t, nfe=6, ncp=2)
+    for b in (m.one, m.two):
+        b.sign = Disjunction(m.t, rule=lambda b, t: [[b.x[t] <= 0, b.dx[t] == 3], [b.x[t] >= 0, b.dx[t] == 1]])
+    pyo.TransformationFactory('fesd.dcs').apply_to(m, wrt=m.t)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m.one, wrt=m.t, nfe=6, ncp=2)
+    pyo.assert_optimal_termination(pyo.SolverFactory('mpec_hybrid').solve(m))
+    assert [s.time for s in pyomo_fesd.switches(m)] == pytest.approx([1 / 3, 2 / 3], abs=1e-9)
+    assert [m.one.x[2].value, m.two.x[2].value] == pytest.approx([5 / 3, 4 / 3], abs=1e-9)
 
 
 def test_elements_that_cannot_be_shared_equally_among_the_stages_are_refused():

@@ -97,14 +97,14 @@ def specify_level_control(m):
 
 
 def heater():
-    m = flowsheet(10, pyo.units.min)
+    m = flowsheet(9, pyo.units.min)
     m.fs.props = GenericParameterBlock(**configuration)
     m.fs.heater = Heater(property_package=m.fs.props, dynamic=True, has_holdup=True)
     return m
 
 
 def specify_heater(m):
-    heater, cv, first = m.fs.heater, m.fs.heater.control_volume, m.fs.time.first()
+    heater, cv = m.fs.heater, m.fs.heater.control_volume
     inlet = heater.inlet
     for var, given in ((inlet.flow_mol, 1), (inlet.temperature, 365), (inlet.pressure, 101325), (inlet.mole_frac_comp, 0.5)):
         var.fix(given)
@@ -122,7 +122,7 @@ def specify_heater(m):
 
 
 def contactor():
-    m = flowsheet(100)
+    m = flowsheet(90)
     m.fs.props = SaponificationParameterBlock()
     streams = {name: {'property_package': m.fs.props} for name in ('rich', 'lean')}
     m.fs.contactor = MSContactor(number_of_finite_elements=3, streams=streams, has_holdup=True)
@@ -150,7 +150,7 @@ def specify_contactor(m):
 
 
 def tube():
-    m = flowsheet(200)
+    m = flowsheet(180)
     m.fs.props = SaponificationParameterBlock()
     m.fs.kinetics = SaponificationReactionParameterBlock(property_package=m.fs.props)
     m.fs.tube = PFR(
@@ -180,7 +180,7 @@ def specify_tube(m):
 
 
 def pipeline():
-    m = flowsheet(20, pyo.units.hr)
+    m = flowsheet(18, pyo.units.hr)
     m.fs.props = NaturalGasParameterBlock()
     m.fs.pipeline = GasPipeline(property_package=m.fs.props, finite_elements=4)
     return m
@@ -216,9 +216,7 @@ def bed():
     m = flowsheet(360)
     m.fs.gas = gas_phase_thermo.GasPhaseParameterBlock()
     m.fs.solid = solid_phase_thermo.SolidPhaseParameterBlock()
-    m.fs.kinetics = hetero_reactions.HeteroReactionParameterBlock(
-        solid_property_package=m.fs.solid, gas_property_package=m.fs.gas
-    )
+    m.fs.kinetics = hetero_reactions.HeteroReactionParameterBlock(solid_property_package=m.fs.solid, gas_property_package=m.fs.gas)
     m.fs.bed = FixedBed0D(gas_property_package=m.fs.gas, solid_property_package=m.fs.solid, reaction_package=m.fs.kinetics)
     return m
 

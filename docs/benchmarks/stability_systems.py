@@ -1,0 +1,212 @@
+"""One description of a switching system, from which the twins of all methods are written.
+
+    dx/dt = f(x, u) + sum_k sum_i nu_ki F_ki(x, u)
+
+Each part k has switching functions c(x) and modes, the sign patterns of c that belong to a rate F.  ``f`` in the signatures is the
+module with the functions ``sin``, ``exp``, ...: ``pyomo.environ`` or ``casadi``.  Time, where it is needed, is a state.
+"""
+
+from dataclasses import dataclass, field
+
+import pyomo.dae as dae
+import pyomo.environ as pyo
+from pyomo.gdp import Disjunction
+
+import pyomo_fesd  # noqa: F401, registers the transformations
+
+
+@dataclass(frozen=True)
+class Part:
+    """Switching functions and modes.
+
+    Attributes
+    ----------
+    c : function (x, f) -> list
+    modes : list of (signs, rates)
+        a sign pattern of c with entries 1 and -1, and a function (x, u, f) -> list with one rate for each state
+    """
+
+    c: object
+    modes: list
+
+
+@dataclass(frozen=True)
+class System:
+    """A switching system with what is to be known of it.
+
+    Attributes
+    ----------
+    x0 : tuple
+        states at time 0
+    end : float
+    parts : list of Part
+    answer : tuple
+        states at ``end``, None for those that are free to differ
+    scale : tuple or None
+        what errors of the states are divided by; None: the larger of 1 and the answer
+    smooth : function (x, u, f) -> list, or None
+        what all modes share
+    stages : list
+        inner boundaries of control stages
+    u : tuple (least, most, guess) or None
+        a control, constant on each stage
+    final : function (x, f) -> expression
+        the objective, of the states at the end; an integral is a state
+    target : function (x, f) -> list of expressions that are 0 at the end
+    free : tuple (least, most) or None
+        bounds of the first state at time 0, if it is free; x0 is the guess
+    value : float or None
+        of the objective
+    guess : tuple or None
+        states that all times start from; None: x0
+    """
+
+    x0: tuple
+    end: float
+    parts: list
+    answer: tuple = ()
+    scale: tuple = None
+    smooth: object = None
+    stages: list = field(default_factory=list)
+    u: tuple = None
+    final: object = None
+    target: object = None
+    free: tuple = None
+    value: float = None
+    guess: tuple = None
+
+
+def one(c, positive, negative, **keywords):
+    """The parts of a system with one switching function and a mode on each side of it."""
+    return [Part(lambda x, f: [c(x, f)], [((1,), positive), ((-1,), negative)], **keywords)]
+
+
+def model(system, discretise=None):
+    """The system in Pyomo, its modes as a Disjunction over time for each part; pyomo.dae cannot discretise Disjunctions."""
+    m = _states(system)
+    if discretise:
+        discretise(m)
+    for k, part in enumerate(system.parts):
+        m.add_component(f'part{k}', Disjunction(m.t, rule=lambda m, t, k=k, part=part: list(_modes(m, t, k, part, system))))
+    return m
+
+
+def smoothed(system, width):
+    """The same with (1 + tanh(c/width))/2 for the step of each switching function; ``width`` relative to c at time 0."""
+    m = _states(system)
+    starts = [max(1e-12, *(abs(float(c)) for c in part.c(system.x0, pyo))) for part in system.parts]
+    starts = [w if w > 1e-6 or _start_is_small(system) else 1.0 for w in starts]
+
+    def rate(m, t, i, k):
+        part, x, u = system.parts[k], _x(m, t), _u(m, t)
+        steps = [(1 + pyo.tanh(c / (width * starts[k]))) / 2 for c in part.c(x, pyo)]
+        total = 0
+        for signs, rates in part.modes:
+            weight = 1
+            for sign, step in zip(signs, steps):
+                weight = weight * (step if sign > 0 else 1 - step)
+            total = total + weight * rates(x, u, pyo)[i]
+        return total
+
+    if len(system.parts) == 1:
+        m.ode = pyo.Constraint(m.t, m.i, rule=lambda m, t, i: m.dx[t, i] == _shared(m, t, i, system) + rate(m, t, i, 0))
+    else:
+        m.ode = pyo.Constraint(m.t, m.k, m.i, rule=lambda m, t, k, i: m.v[t, k, i] == rate(m, t, i, k))
+    return m
+
+
+def _start_is_small(system):
+    return max(map(abs, system.x0)) < 1e-6
+
+
+def _states(system):
+    """States, controls, objective: all but the modes."""
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(initialize=[0, *system.stages, system.end])
+    m.i = pyo.RangeSet(0, len(system.x0) - 1)
+    begin = system.guess or system.x0
+    m.x = pyo.Var(m.t, m.i, initialize=lambda m, t, i: begin[i])
+    m.dx = dae.DerivativeVar(m.x, wrt=m.t)
+    for i in m.i:
+        m.x[0, i].fix(system.x0[i])
+    if system.free:
+        m.x[0, 0].unfix()
+        m.x[0, 0].setlb(system.free[0])
+        m.x[0, 0].setub(system.free[1])
+    if system.u:
+        m.u = pyo.Var(m.t, bounds=system.u[:2], initialize=system.u[2])
+    if len(system.parts) > 1:
+        m.k = pyo.RangeSet(0, len(system.parts) - 1)
+        m.v = pyo.Var(m.t, m.k, m.i, initialize=0)
+        m.sum = pyo.Constraint(
+            m.t, m.i, rule=lambda m, t, i: m.dx[t, i] == _shared(m, t, i, system) + sum(m.v[t, k, i] for k in m.k)
+        )
+    _add_objective(m, system)
+    return m
+
+
+def _add_objective(m, system):
+    last = m.t.last()
+    if system.target:
+        targets = system.target(_x(m, last), pyo)
+        m.target = pyo.Constraint(range(len(targets)), rule=lambda m, i: targets[i] == 0)
+    if system.final:
+        m.objective = pyo.Objective(expr=system.final(_x(m, last), pyo))
+
+
+def _modes(m, t, k, part, system):
+    """The disjuncts of one part: its region, and what the states do there."""
+    x, u = _x(m, t), _u(m, t)
+    functions = part.c(x, pyo)
+    for signs, rates in part.modes:
+        region = [c >= 0 if sign > 0 else c <= 0 for c, sign in zip(functions, signs)]
+        found = rates(x, u, pyo)
+        if len(system.parts) == 1:
+            yield region + [m.dx[t, i] == _shared(m, t, i, system) + found[i] for i in m.i]
+        else:
+            yield region + [m.v[t, k, i] == found[i] for i in m.i]
+
+
+def _shared(m, t, i, system):
+    return system.smooth(_x(m, t), _u(m, t), pyo)[i] if system.smooth else 0
+
+
+def _x(m, t):
+    return [m.x[t, i] for i in m.i]
+
+
+def _u(m, t):
+    return m.u[t] if m.component('u') is not None else 0.0
+
+
+def transform_moving(m, system, nfe, ncp, scheme):
+    """The two transformations of the package."""
+    pyo.TransformationFactory('fesd.dcs').apply_to(m)
+    controls = [m.u] if system.u else []
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(
+        m, wrt=m.t, nfe=nfe, ncp=ncp, scheme=scheme, piecewise_constant=controls
+    )
+
+
+def fixed_grid(system, nfe, ncp):
+    """A function that puts a model without modes on pyomo.dae's grid."""
+
+    def discretise(m):
+        pyo.TransformationFactory('dae.collocation').apply_to(m, wrt=m.t, nfe=nfe, ncp=ncp, scheme='LAGRANGE-RADAU')
+        if system.u:
+            # one value on each stage of the moving grid, not on each element
+            stages = [0, *system.stages, system.end]
+            m.held = pyo.Constraint(m.t, rule=lambda m, t: _held(m, t, stages))
+
+    return discretise
+
+
+def _held(m, t, stages):
+    end = next(b for b in stages[1:] if t <= b + 1e-9)
+    own = min(m.t, key=lambda s: abs(s - end))
+    return pyo.Constraint.Skip if own == t else m.u[t] == m.u[own]
+
+
+def reached(m):
+    """States at the last time."""
+    return [m.x[m.t.last(), i].value for i in m.i]
