@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 from wp_front import front, slope
 from wp_table import BIG_M, EVENTS, EXACT, FIXED, MARCH, NOSNOC, ORDERS, OURS, REFINE, SMOOTH, STEPS, TIGHT, TIGHT_STEPS
 
@@ -80,6 +81,10 @@ def work_precision(axis, rows, curves):
         axis.plot(claimed['total'], claimed['error'].clip(lower=1e-15), curve.marker, color=curve.colour, ms=3, alpha=0.3)
         axis.plot(times, errors, curve.line, marker=curve.marker, color=curve.colour, ms=5, lw=1.4)
         ends.append((name, curve.colour, times[-1], errors[-1]))
+    axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.xaxis.set_major_formatter('{x:g}')
+    axis.xaxis.set_minor_formatter('')
+    axis.tick_params('x', labelsize='small')
     axis.grid(alpha=0.3)
     _label(axis, ends)
 

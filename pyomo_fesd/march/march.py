@@ -21,7 +21,7 @@ from pyomo_fesd.march.accumulation import accumulation
 from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
-from pyomo_fesd.march.kind import Kind, State, active_at_first
+from pyomo_fesd.march.kind import Kind, State, active_at_first, find_first
 from pyomo_fesd.march.prescribed import prescribed_states
 from pyomo_fesd.march.residuals import largest_residuals
 from pyomo_fesd.march.shares import Even, Passed, equal_lengths, wanted
@@ -131,7 +131,7 @@ class March:
         equations = self._reader.first(first)
         states = [d.get_state_var() for d in derivatives(self._model, self._wrt)]
         refuse_free_start(equations, [v for x in states for v in x.values() if self._times.time(v) == first and not v.fixed])
-        if equations.unknown:
+        if equations.unknown and not find_first(equations, self._reader.sides(first), self._options, self._timer):
             with phase(self._timer, 'compile'):
                 window = Window(equations, self._options)
             with phase(self._timer, 'window'):

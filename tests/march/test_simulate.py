@@ -645,7 +645,10 @@ def test_an_unknown_option():
 
 
 def test_options_reach_the_solver():
-    m = transform(signum.build(), 4)
+    # it starts where two modes meet, so a small problem with complementarity is solved
+    m = signum.build()
+    m.x[0].fix(0.0)
+    transform(m, 4)
     called = []
     pyomo_fesd.simulate(m, callback=lambda progress: called.append(progress))
     assert called
