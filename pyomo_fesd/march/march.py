@@ -230,7 +230,7 @@ class March:
                 "look for a bound that the solution reaches there, or for a state from which no mode leads on",
             )
         raise self._stuck(
-            f"no step was found from time {self._time:.6g}: {answer.reason or answer.outcome}{forced}",
+            f"no step was found from time {self._time:.6g}: {answer.outcome}{forced}",
             "check the equations there; more elements help where the solution is steep",
         )
 
