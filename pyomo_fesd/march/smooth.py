@@ -97,6 +97,12 @@ class Smooth:
         G, H = self._sums(values)
         return G >= H
 
+    def guess(self, w):
+        """An active set by the continuous sides only: the multipliers at ``w`` are a first guess."""
+        V, _ = self._f.at(w)
+        sides = V[self._f.signed][: 2 * len(self.names)].sum(axis=1)
+        return sides[1::2] <= ABSOLUTE
+
     def _sums(self, values):
         """The sums of both sides of every condition over the stages."""
         return values[: 2 * len(self.names), : self._stages.size].sum(axis=1).reshape(-1, 2).T
@@ -137,7 +143,8 @@ class Smooth:
     def _try(self, w, active, most, left):
         """The element with one active set, or None; and functions that are negative from its beginning."""
         start = w.copy()
-        start[self._f.length] = most
+        if self._f.length is not None:
+            start[self._f.length] = most
         found = self._system(active).solve(start)
         if found is None:
             return None, []
@@ -172,7 +179,7 @@ class Smooth:
             starts = f.starts[zero]
             vanishing = np.concatenate([f.vanishing, *held, starts[starts >= 0]])
             columns = np.arange(f.lower.size)
-            if event is None:
+            if event is None and f.length is not None:
                 columns = np.delete(columns, f.length)
             self._systems[key] = System(f, vanishing, columns, None if event is None else self._arrival(event))
         return self._systems[key]

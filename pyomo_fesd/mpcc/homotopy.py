@@ -11,6 +11,7 @@ import numpy as np
 from pyomo_fesd.mpcc.active_set import ActiveSets, active_sets
 from pyomo_fesd.mpcc.nlp import NlpResult
 from pyomo_fesd.mpcc.recovery import LADDER
+from pyomo_fesd.mpcc.stationarity import Stationarity
 
 #: For each path the form of its first relaxation and that of the others, without an objective and with one.  The elastic form is by
 #: far the quickest; Scholtes' at the first eps puts every pair in the middle, whatever the size of the objective.  The next path
@@ -143,18 +144,21 @@ class Homotopy:
         return None not in (before, now) and max(before, now) - best <= same
 
     def _other_form(self, stage, relaxed):
-        """Where a path ends with nothing certified: the same with shorter elements if nothing is feasible, then the next path."""
+        """Where a path ends with nothing certified: the same with shorter elements if they may be missing, then the next path."""
         if self._branches is None or self._certified():
             return None
-        wider = self.run.point is None and self._c.widen()
+        wider = self._short_of_lengths() and self._c.widen()
         path = stage.path + (not wider)
         if path == len(self._paths):
             return None
-        found = "feasible" if wider else "certified"
-        self._steps.note(f"nothing {found} on this path, " + ("shorter elements" if wider else "other form"), relaxed.w)
+        self._steps.note("nothing certified on this path, " + ("shorter elements" if wider else "other form"), relaxed.w)
         self._gap.restart()
         self._branches.forget()
         return _Stage(path, self._start, self._options.eps_init)
+
+    def _short_of_lengths(self):
+        """Whether there is nothing feasible, or what only a bound of the method keeps from descending."""
+        return self.run.point is None or self.run.point.certificate.grade is Stationarity.LIMITED
 
     def _certified(self):
         return self.run.point is not None and self.run.point.certificate.certified

@@ -11,7 +11,6 @@ from pyomo_fesd.march.equations import Reader
 from pyomo_fesd.march.residuals import largest_residuals
 from pyomo_fesd.timeindex import TimeIndex
 
-
 START = 0.75e6
 
 
