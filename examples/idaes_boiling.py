@@ -39,7 +39,6 @@ from idaes.models.properties.modular_properties.phase_equil.bubble_dew import Id
 from idaes.models.properties.modular_properties.phase_equil.forms import fugacity
 from idaes.models.properties.modular_properties.pure import NIST
 from idaes.models.properties.modular_properties.state_definitions import FTPx
-
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 

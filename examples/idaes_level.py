@@ -21,6 +21,7 @@ from idaes.models.control.controller import (
 )
 from idaes_overflow import INFLOW, initialise, plant, settle_reactor
 from matplotlib.figure import Figure
+from pyomo.dae.flatten import flatten_dae_components
 from scipy.integrate import solve_ivp
 
 import pyomo_fesd
@@ -113,14 +114,26 @@ def moving_grid(nfe=20, ncp=3, how=exact):
     return m, solve(m)
 
 
-def smooth(eps, boundaries, ncp=3):
-    """IDAES' own controller with smoothing ``eps`` on given elements, by pyomo.dae."""
-    m = build(times=list(boundaries))
+def smooth(eps, known, ncp=3):
+    """IDAES' own controller with smoothing ``eps`` by pyomo.dae, on the elements of a solved model, begun at its values."""
+    grid = boundaries(known)
+    m = build(times=grid)
     m.fs.pid.smooth_eps.set_value(eps)
-    pyo.TransformationFactory('dae.collocation').apply_to(m.fs, wrt=m.fs.time, nfe=len(boundaries) - 1, ncp=ncp)
+    pyo.TransformationFactory('dae.collocation').apply_to(m.fs, wrt=m.fs.time, nfe=len(grid) - 1, ncp=ncp)
     specify(m)
+    values = {name: [data.value for data in v.values()] for name, v in over_time(known)}
+    for name, v in over_time(m):
+        for data, value in zip(v.values(), values[name]):
+            if not data.fixed:
+                data.set_value(value)
     pyo.assert_optimal_termination(pyo.SolverFactory('mpec_hybrid').solve(m))
     return m
+
+
+def over_time(m):
+    """(name, family over time) of all variables of the flowsheet."""
+    _, families = flatten_dae_components(m.fs, m.fs.time, pyo.Var)
+    return [(str(pyo.ComponentUID(v.referent)), v) for v in families]
 
 
 def boundaries(m):
@@ -215,11 +228,12 @@ def main():
     known, end = reference()
     print(f'mpec_hybrid: {results.solver.reason}.')
     for change, exact_change in zip(changes(m), known):
-        print(f'From {change.time:.6f} s on the valve {change.now}: {change.time - exact_change.time:+.1e} s off the reference.')
+        now = change.now if change.now == 'follows' else f'is {change.now}'
+        print(f'From {change.time:.6f} s on the valve {now}, {change.time - exact_change.time:+.1e} s off the reference.')
     table = pyomo_fesd.trajectory(m, m.fs.time)
     print(f'The flow stays within [{table[FLOW].min():.1e}, {table[FLOW].max():.9f}] m3/s.')
     print(f'The volume ends at {table[VOLUME].iloc[-1]:.9f} m3, {table[VOLUME].iloc[-1] - end:+.1e} off.')
-    rounded = {eps: smooth(eps, boundaries(m)) for eps in (1e-3, 1e-4, 1e-5)}
+    rounded = {eps: smooth(eps, m) for eps in (1e-3, 1e-4, 1e-5)}
     for eps, model in rounded.items():
         print(f'With smooth_eps = {eps:.0e} m3/s the volume differs by up to {largest_difference(m, model):.1e} m3.')
     draw(m, rounded[1e-3])

@@ -73,7 +73,7 @@ def variable(given, block, name):
 def like(number, quantity):
     """A bare number with the unit of ``quantity``; everything else as it is."""
     unit = None if number.__class__ not in native_numeric_types else units.get_units(quantity)
-    return number if unit is None or not number else number * unit
+    return number if unit in (None, units.dimensionless) or not number else number * unit
 
 
 def refuse_order(block, low, high, names):
