@@ -34,9 +34,11 @@ def excursions(model, wrt, functions):
     grid, time = grid_of(records(model).grids[wrt]), physical_time(model, wrt)
     tau, after = np.array([0.0, *grid.tau]), _values_after_jumps(model, wrt)
     for name, kept, sign in _kept(model, wrt, functions):
-        zero = ZERO * size(kept)
+        numbers = {label: value(function) for label, function in kept.items()}
+        zero = ZERO * size(numbers)
         for element in grid.elements:
-            place = _excursion(kept, element, sign(element, zero), zero, tau, after.get(element.n, ComponentMap()))
+            jumping = after.get(element.n, ComponentMap())
+            place = _excursion(kept, numbers, element, sign(numbers, element, zero), zero, tau, jumping)
             if place is not None:
                 when = time[element.left] + place * (time[element.right] - time[element.left])
                 yield (
@@ -52,29 +54,29 @@ def _values_after_jumps(model, wrt):
 
 
 def _kept(model, wrt, functions):
-    """``(name, {label: expression}, function (element, zero) -> sign)`` of everything that keeps its sign inside an element."""
+    """``(name, {label: expression}, function (numbers, element, zero) -> sign)`` of what keeps its sign inside an element."""
     for s in functions:
-        yield s.name, s.c, lambda element, zero, c=s.c: _sign(c, element, zero)
+        yield s.name, s.c, _sign
     for mode in read_modes(model, wrt):
         for k in range(min(map(len, mode.conditions.values()))):
             kept = {t: conditions[k] for t, conditions in mode.conditions.items()}
-            yield mode.title, kept, lambda element, zero, mode=mode: int(value(mode.weight(element)) > 0.5)
+            yield mode.title, kept, lambda numbers, element, zero, mode=mode: int(value(mode.weight(element)) > 0.5)
     for jump in read_jumps(model, wrt):
-        yield jump.name, jump.guards, lambda element, zero: 1
+        yield jump.name, jump.guards, lambda numbers, element, zero: 1
 
 
-def _sign(c, element, zero):
+def _sign(numbers, element, zero):
     """The sign that c has at the stage points of an element; 0 if it slides."""
-    largest = max((value(c[t]) for t in element.points if t in c), key=abs, default=0.0)
+    largest = max((numbers[t] for t in element.points if t in numbers), key=abs, default=0.0)
     return 0 if abs(largest) <= zero else int(np.sign(largest))
 
 
-def _excursion(functions, element, sign, zero, tau, after):
+def _excursion(functions, numbers, element, sign, zero, tau, after):
     """The relative time at which sign c is clearly negative inside an element; None if it is not."""
     labels = (element.left, *element.points)
     if sign == 0 or any(t not in functions for t in labels):
         return None
-    at_stages = np.array([sign * value(functions[t]) for t in element.points])
+    at_stages = np.array([sign * numbers[t] for t in element.points])
     largest = np.abs(at_stages).max()
     if largest <= zero or at_stages.min() > 2 * np.ptp(at_stages):
         return None  # it rests at zero, or stays far from it

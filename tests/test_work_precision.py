@@ -18,6 +18,7 @@ from wp_table import (
     NOSNOC,
     OURS,
     PROBLEMS,
+    REFINE,
     RUNS,
     SQRT,
     TANH,
@@ -37,15 +38,16 @@ GRIDS = {
     'sliding-mode control': (2, 12),
 }
 #: What a method may be off there
-PRECISE = {OURS: 5e-5, MARCH: 1e-5, EVENTS: 1e-7}
+PRECISE = {OURS: 5e-5, MARCH: 1e-5, REFINE: 1e-6, EVENTS: 1e-7}
 ROUGH = {FIXED: 0.35, BIG_M: 0.35, TANH: 0.5, SQRT: 0.5}
+TOLERANCES = {EVENTS: 1e-10, REFINE: 1e-6}
 PAIRS = dict.fromkeys((r.problem, r.method) for r in RUNS)
 
 
 def quick(problem, method, N=None, K=None):
     """The row of a quick run."""
     points, number = GRIDS[problem]
-    width, start = 1e-10 if method == EVENTS else 1e-2, -1.4 if problem == 'false minima' else 0.0
+    width, start = TOLERANCES.get(method, 1e-2), -1.4 if problem == 'false minima' else 0.0
     return row_of(Run(problem, method, 'Radau', K or points, N or number, width, start), 30)
 
 

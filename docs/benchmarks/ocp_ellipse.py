@@ -13,6 +13,7 @@ sys.path.append(str(Path(__file__).parents[2] / 'examples'))
 import projected_ellipse  # noqa: E402
 
 STAGES, ELEMENTS, NCP = 20, 2, 3
+REFERENCE = 1.540945
 
 
 def build(stages=STAGES, side='right'):

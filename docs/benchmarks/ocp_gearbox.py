@@ -15,7 +15,7 @@ sys.path.append(str(Path(__file__).parents[2] / 'examples'))
 import gearbox_car  # noqa: E402
 
 STAGES, ELEMENTS, NCP = 10, 3, 2
-OPTIONS = {'relaxation': 'elastic'}
+REFERENCE = gearbox_car.T_BEST
 S_MIN, S_MAX, HORIZON = 0.1, 20.0, 5.0
 
 

@@ -16,7 +16,9 @@ import pyomo_fesd  # noqa: F401
 HORIZON, STAGES, ELEMENTS, NCP = 0.08, 30, 2, 2
 M1, M2, K, R, L, K_F, K_S, F_R = 1.03, 0.56, 2400.0, 2.0, 2e-3, 12.0, 12.0, 2.1
 U_MAX = 5.0
-GOAL = (0.01, 0.0, 0.01, 0.0, 0.0)
+U_RANGE, CONTROLS = (-U_MAX, U_MAX), 1
+REFERENCE = 0.855622
+START, GOAL = (0.0,) * 5, (0.01, 0.0, 0.01, 0.0, 0.0)
 
 
 def build(stages=STAGES):
@@ -53,6 +55,20 @@ def discretise(m, elements=ELEMENTS, ncp=NCP, scheme='LAGRANGE-RADAU'):
     number = elements * (len(m.t) - 1)
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=number, ncp=ncp, scheme=scheme, piecewise_constant=[m.u])
     return m
+
+
+def plant(x, u):
+    """For ocp_replay: the friction and the rate of the cost."""
+    x1, v1, x2, v2, current = x
+    spring = K * (x2 - x1)
+    f = np.array([v1, (spring + K_F * current) / M1, v2, -spring / M2, (u[0] - R * current - K_S * v1) / L])
+    along = np.eye(5)[[1]]
+    return f, -F_R / M1 * along.T, np.array([v1]), along, u[0] ** 2
+
+
+def missed(x):
+    """How far from the goal the end is, in mm."""
+    return 1e3 * float(np.abs(x - GOAL)[[0, 2]].max())
 
 
 def with_nosnoc(stages=STAGES, elements=ELEMENTS, ncp=NCP, scheme='RADAU', u=None, **settings):

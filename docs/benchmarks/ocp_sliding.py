@@ -18,6 +18,8 @@ import pyomo_fesd  # noqa: F401
 HORIZON, STAGES, ELEMENTS, NCP = 4.0, 6, 6, 2
 START, GOAL = (2 * pi / 3, pi / 3, 0.0, 0.0), (-pi / 6, -pi / 4)
 U_MAX = 10.0
+U_RANGE, CONTROLS = (-U_MAX, U_MAX), 2
+REFERENCE = 5.592183
 
 
 def build(stages=STAGES):
@@ -59,6 +61,20 @@ def discretise(m, elements=ELEMENTS, ncp=NCP, scheme='LAGRANGE-RADAU'):
     number = elements * (len(m.t) - 1)
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=number, ncp=ncp, scheme=scheme, piecewise_constant=[m.u])
     return m
+
+
+def plant(x, u):
+    """For ocp_replay: both relays and the rate of the cost."""
+    q1, q2, v1, v2 = x
+    f, g = np.array([v1, v2, *u]), -np.eye(4)[:, :2]
+    surfaces = np.array([q1 + 0.15 * q2**2, q2 - 0.05 * q1**3])
+    gradients = np.array([[1, 0.3 * q2, 0, 0], [-0.15 * q1**2, 1, 0, 0]])
+    return f, g, surfaces, gradients, v1**2 + v2**2
+
+
+def missed(x):
+    """How far from the goal the end is."""
+    return float(np.abs(x[:2] - GOAL).max())
 
 
 def with_nosnoc(stages=STAGES, elements=ELEMENTS, ncp=NCP, scheme='RADAU', u=None, **settings):

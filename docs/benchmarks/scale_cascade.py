@@ -1,27 +1,42 @@
-"""A cascade of tanks, each of which overflows into the next: as many switching subsystems as wanted, with an exact answer.
+"""A cascade of tanks, each of which overflows into the next: as many switching subsystems as wanted.
 
-    dx_k/dt = feed_k + q_{k-1} - LOSS x_k - q_k,      q_k = 0 where x_k < 1,   q_k = WEIR where x_k > 1
+    dx_k/dt = feed_k + q_{k-1} - q_k,      q_k = 0 where x_k < 1,   q_k = WEIR (x_k - 1) where x_k > 1
 
-A full tank stays on its weir (a slide), which lets through what is too much.  The first tank of each group starts below its weir
-and is full after a while; the others start full.
+The first tank of each group starts below its weir and is full after a while; the others start with what overflows at rest.
 """
 
-from math import exp, log
-
+import numpy as np
 import pyomo.dae as dae
 import pyomo.environ as pyo
-from pyomo.gdp import Disjunct, Disjunction
+from pyomo.gdp import Disjunction
+from scipy.linalg import expm
+from scipy.optimize import brentq
 
-HORIZON, LOSS, WEIR = 10.0, 0.01, 4.0
-#: Too much that the first tank gets, and all the others together.
+HORIZON, WEIR = 10.0, 4.0
+#: Feed of the first tank, and of all the others together.
 FIRST, TOGETHER = 1.0, 1.0
-GROUPS, DEFICIT = 4, 2.0
+#: What the first tank of each group lacks at the first time.
+DEFICITS = (2.0, 0.8, 1.3, 1.8)
 
 
 def heads(S):
-    """The first tank of each group."""
-    groups = min(S, GROUPS)
-    return [round(k * S / groups) for k in range(groups)]
+    """The first tanks of the groups, with what they lack."""
+    groups = min(S, len(DEFICITS))
+    return {round(k * S / groups): DEFICITS[k] for k in range(groups)}
+
+
+def feeds(S):
+    """Feed of each tank."""
+    return np.array([FIRST, *[TOGETHER / S] * (S - 1)])
+
+
+def start(S):
+    """Levels at the first time."""
+    levels, flow, first = [], 0.0, heads(S)
+    for k, feed in enumerate(feeds(S)):
+        flow = 0.0 if k in first else flow + feed
+        levels.append(1 - first[k] if k in first else 1 + flow / WEIR)
+    return np.array(levels)
 
 
 def build(S):
@@ -29,16 +44,16 @@ def build(S):
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, HORIZON))
     m.tank = pyo.RangeSet(0, S - 1)
-    m.x = pyo.Var(m.tank, m.t, initialize=1.0)
+    feed, given = feeds(S), start(S)
+    m.x = pyo.Var(m.tank, m.t, initialize=lambda m, k, t: given[k])
     m.dx = dae.DerivativeVar(m.x, wrt=m.t)
     m.q = pyo.Var(m.tank, m.t, initialize=0.0)
     for k in m.tank:
-        m.x[k, 0].fix(1.0 - (DEFICIT if k in heads(S) else 0.0))
+        m.x[k, 0].fix()
 
     @m.Constraint(m.tank, m.t)
     def balance(m, k, t):
-        above = m.q[k - 1, t] if k else 0.0
-        return m.dx[k, t] == _surplus(k, S) + LOSS + above - LOSS * m.x[k, t] - m.q[k, t]
+        return m.dx[k, t] == feed[k] + (m.q[k - 1, t] if k else 0.0) - m.q[k, t]
 
     @m.Disjunct(m.tank, m.t)
     def low(d, k, t):
@@ -48,36 +63,36 @@ def build(S):
     @m.Disjunct(m.tank, m.t)
     def full(d, k, t):
         d.region = pyo.Constraint(expr=d.model().x[k, t] >= 1)
-        d.flow = pyo.Constraint(expr=d.model().q[k, t] == WEIR)
+        d.flow = pyo.Constraint(expr=d.model().q[k, t] == WEIR * (d.model().x[k, t] - 1))
 
     m.weir = Disjunction(m.tank, m.t, rule=lambda m, k, t: [m.low[k, t], m.full[k, t]])
     return m
 
 
-def _surplus(k, S):
-    return FIRST if k == 0 else TOGETHER / S
-
-
 def exact(S):
-    """Times at which the heads get full, in their order."""
-    level, times, now = dict.fromkeys(heads(S), 1.0 - DEFICIT), [], 0.0
-    while level:
-        # x = in/LOSS + (x_0 - in/LOSS) exp(-LOSS t)
-        ends = {k: LOSS + sum(_surplus(j, S) for j in range(_above(k, level), k + 1)) for k in level}
-        ends = {k: inflow / LOSS for k, inflow in ends.items()}
-        k = min(level, key=lambda k: _time(level[k], ends[k]))
-        step = _time(level[k], ends[k])
-        now += step
+    """Times at which heads get full, in their order: the levels are linear between the switches."""
+    x, waiting, times, now = start(S), set(heads(S)), [], 0.0
+    while True:
+        levels = _levels(S, waiting, x)
+        full = levels(HORIZON - now) > 1
+        ends = {k: _first_time(levels, k, HORIZON - now) for k in waiting if full[k]}
+        if not ends:
+            return times
+        k = min(ends, key=ends.get)
+        x, now = levels(ends[k]), now + ends[k]
+        waiting.remove(k)
         times.append(now)
-        level = {j: ends[j] + (x - ends[j]) * exp(-LOSS * step) for j, x in level.items() if j != k}
-    return times
 
 
-def _time(x, end):
-    """How long a level takes to the weir."""
-    return log((x - end) / (1 - end)) / LOSS
+def _levels(S, waiting, x):
+    """``time -> levels`` from ``x``, with the overflows of all tanks that are not ``waiting``."""
+    flows = np.diag([0.0 if k in waiting else WEIR for k in range(S)])
+    # of the levels above the weir, and a state that is 1
+    A = np.zeros((S + 1, S + 1))
+    A[:S, :S] = np.eye(S, k=-1) @ flows - flows
+    A[:S, S] = feeds(S)
+    return lambda s: (expm(A * s) @ np.append(x - 1, 1.0))[:S] + 1
 
 
-def _above(k, waiting):
-    """The first tank whose water comes to tank ``k``: the one after the last that is not full."""
-    return max((j + 1 for j in waiting if j < k), default=0)
+def _first_time(levels, k, last):
+    return brentq(lambda s: levels(s)[k] - 1, 0, last, xtol=1e-13)

@@ -28,10 +28,15 @@ class SystemModel:
         """The same from another start of the first state."""
         return SystemModel(self.system.at(start))
 
-    def moving(self, K, N, scheme):
-        """On moving elements."""
+    def transformed(self):
+        """In continuous time, with multipliers instead of modes."""
         m = add_modes(plant(self.system), self.system)
         pyo.TransformationFactory('fesd.dcs').apply_to(m)
+        return m
+
+    def moving(self, K, N, scheme):
+        """On moving elements."""
+        m = self.transformed()
         pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=N, ncp=K, scheme=SCHEMES[scheme])
         return m
 

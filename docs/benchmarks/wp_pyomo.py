@@ -9,7 +9,7 @@ import pyomo.environ as pyo
 from pyomo.common.timing import HierarchicalTimer
 from pyomo.contrib.fbbt.fbbt import compute_bounds_on_expr
 from pyomo.contrib.solver.common.factory import SolverFactory
-from wp_models import SystemModel, smooth, state
+from wp_models import SCHEMES, SystemModel, smooth, state
 from wp_systems import Found, reached
 
 import pyomo_fesd
@@ -39,6 +39,17 @@ def simulate(problem, K, N, scheme, limit, **_):
     except pyomo_fesd.FesdError as error:
         return Found(str(error)[:100], False, built - started, time.perf_counter() - built)
     found = Found('marched', True, built - started, time.perf_counter() - built)
+    problem.read(found, m)
+    return _with_switch(found, m)
+
+
+def refine(problem, K, scheme, width, limit, **_):
+    """Moving elements, as many as it takes for the tolerance ``width``."""
+    started = time.perf_counter()
+    m = problem.transformed()
+    built = time.perf_counter()
+    reached_it = pyomo_fesd.refine(m, width, ncp=K, scheme=SCHEMES[scheme], time_limit=limit).reached
+    found = Found('reached' if reached_it else 'not reached', reached_it, built - started, time.perf_counter() - built)
     problem.read(found, m)
     return _with_switch(found, m)
 

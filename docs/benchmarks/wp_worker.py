@@ -17,7 +17,7 @@ COLUMNS = (
     *('error', *(f'error {name}' for name in QUANTITIES)),
 )
 #: Runs that take less than so many seconds are done three times; the medians count.
-SHORT, TIMES = 1.0, 3
+SHORT, TIMES = 0.4, 3
 #: First of all, so that nothing is loaded for the first time in a run that is timed.
 WARM_UP = (Run('signum', OURS, 'Radau', 2, 4), Run('signum', NOSNOC, 'Radau', 2, 4), Run('signum', BIG_M, 'Radau', 1, 4))
 

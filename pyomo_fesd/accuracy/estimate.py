@@ -12,7 +12,12 @@ is never taken larger than that of the scheme, nor than log(E_{k-1}/E_k)/log(N_{
 rounds only.  Rounds whose active sets follow each other differently cannot be compared: the coarse one knows nothing of the
 solution yet.
 
-Where the elements are shared differently among control stages, N is the *effective* number (``placing``).
+N is the *effective* number of elements (``placing``).  A piece that has the same elements in both rounds makes no difference; its
+error is not seen in E, and
+
+    c_K sum_n theta_n**(p+1)
+
+over such pieces is added, with the error constant c_K of the scheme for x' = x.
 
 Takes: two ``Solution``.
 Leaves: nothing.
@@ -20,13 +25,18 @@ Does not apply: to errors that no grid shows, such as a local minimum in place o
 """
 
 from dataclasses import dataclass
+from math import factorial, inf
 
 import numpy as np
 from scipy.interpolate import KroghInterpolator
 from scipy.optimize import brentq
 
+from pyomo_fesd.accuracy.placing import scales
+
 #: For what is not asymptotic yet.
 SAFETY = 4.0
+#: A piece whose elements are longer than this part of what they were has the same as before.
+SAME = 0.9
 #: The least order that is believed.
 LEAST_ORDER = 0.5
 
@@ -41,7 +51,14 @@ class Difference:
     quantities: float
 
     def __mul__(self, factor):
-        return Difference(*(factor * d for d in (self.states, self.switches, self.objective, self.quantities)))
+        return Difference(*(factor * d for d in self._all))
+
+    def __add__(self, more):
+        return Difference(*(d + more for d in self._all))
+
+    @property
+    def _all(self):
+        return self.states, self.switches, self.objective, self.quantities
 
     @property
     def largest(self):
@@ -121,5 +138,18 @@ def observed_order(numbers, largest, order):
 
 
 def error(numbers, found, p):
-    """The estimated error of the finest solution, from two effective numbers and the ``Difference`` between them."""
-    return found * (SAFETY / ((numbers[-1] / numbers[-2]) ** p - 1))
+    """The estimated error of the finest solution, from effective numbers and the ``Difference`` between the last two rounds."""
+    ratio = (numbers[-1] / numbers[-2]) ** p
+    return found * (SAFETY / (ratio - 1) if ratio > 1 else inf)
+
+
+def unseen(coarse, fine, order):
+    """The error of pieces that have the same elements in both rounds, by the local scales alone."""
+    pairs = zip(coarse.pieces, fine.pieces)
+    same = [f for c, f in pairs if np.max(np.diff(f.nodes)) > SAME * np.max(np.diff(c.nodes))]
+    K = len(fine.grid.tau)
+    if fine.grid.right_is_stage:
+        constant = factorial(K) * factorial(K - 1) / (factorial(2 * K - 1) * factorial(2 * K))
+    else:
+        constant = factorial(K) ** 2 / (factorial(2 * K) * factorial(2 * K + 1))
+    return constant * sum(float(np.sum(scales(fine, p) ** (order + 1))) for p in same)

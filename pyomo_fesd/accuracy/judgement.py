@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from math import nan
 
-from pyomo_fesd.accuracy.estimate import Difference, difference, error, observed_order
-from pyomo_fesd.accuracy.placing import effective, next_numbers, weights
+from pyomo_fesd.accuracy.estimate import Difference, difference, error, observed_order, unseen
+from pyomo_fesd.accuracy.placing import densities, effective, next_numbers
 
 #: Growth where nothing tells how much is needed.
 DOUBLE = 2.0
@@ -45,15 +45,16 @@ def judge(rounds, scheme, tolerance, most):
     most : list of int
         largest numbers of elements of the control stages
     """
-    numbers, stages = rounds[-1].numbers, weights(rounds[-1].solution, scheme)
+    solutions, numbers = [r.solution for r in rounds[-3:]], rounds[-1].numbers
+    pieces = densities(solutions[-1], scheme)
     if len(rounds) == 1:
-        return Judgement(UNKNOWN, nan, next_numbers(numbers, stages, scheme, DOUBLE, most))
-    recent = rounds[-3:]
-    found = [difference(a.solution, b.solution) for a, b in zip(recent, recent[1:])]
-    sizes = [effective(r.numbers, stages, scheme) for r in recent]
-    order = observed_order(sizes, [d.largest for d in found], scheme) if len(recent) == 3 else nan
-    estimate = error(sizes, found[-1], order if len(recent) == 3 else 1.0)
-    # what is not observed yet is expected of the scheme, to go on with
-    expected = order if len(recent) == 3 else scheme
-    factor = (error(sizes, found[-1], expected).largest / tolerance) ** (1 / expected)
-    return Judgement(estimate, order, next_numbers(numbers, stages, scheme, factor, most))
+        return Judgement(UNKNOWN, nan, next_numbers(numbers, pieces, scheme, DOUBLE, most))
+    found = [difference(a, b) for a, b in zip(solutions, solutions[1:])]
+    sizes = [effective(s, pieces, scheme) for s in solutions]
+    observed = observed_order(sizes, [d.largest for d in found], scheme) if len(solutions) == 3 else nan
+    estimate = error(sizes, found[-1], observed if len(solutions) == 3 else 1.0) + unseen(*solutions[-2:], scheme)
+    # to go on with, the order of the scheme is expected, unless what is observed is far from it
+    order = observed if observed < scheme / 2 else scheme
+    ahead = error(sizes, found[-1], order) + unseen(*solutions[-2:], scheme)
+    factor = (ahead.largest / tolerance) ** (1 / order)
+    return Judgement(estimate, observed, next_numbers(numbers, pieces, scheme, factor, most))

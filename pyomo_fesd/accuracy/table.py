@@ -6,6 +6,10 @@ import pandas as pd
 
 #: Errors that are estimated, each with a column.
 ERRORS = ('states', 'switches', 'objective', 'quantities')
+#: How numbers are printed.
+FORMATS = {'order': '{:.1f}', 'seconds': '{:.1f}', 'pairs': '{:.0f}'}
+#: Characters of a note that are printed.
+NOTE = 60
 
 
 @dataclass(frozen=True)
@@ -69,4 +73,5 @@ class Table:
 
 def lines(table):
     """As text."""
-    return table.to_string(float_format='{:.1e}'.format, na_rep='-')
+    formatters = {name: FORMATS.get(name, '{:.1e}').format for name in (*ERRORS, *FORMATS)}
+    return table.to_string(formatters=formatters, na_rep='-', max_colwidth=NOTE)

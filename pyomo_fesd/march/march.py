@@ -21,7 +21,9 @@ from pyomo_fesd.march.accumulation import accumulation
 from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
-from pyomo_fesd.march.kind import Kind, State, active_at_first
+from pyomo_fesd.march.kind import Kind, State, active_at_first, find_first
+from pyomo_fesd.march.prescribed import prescribed_states
+from pyomo_fesd.march.residuals import largest_residuals
 from pyomo_fesd.march.shares import Even, Passed, equal_lengths, wanted
 from pyomo_fesd.march.window import Window
 from pyomo_fesd.mpcc.phase import phase
@@ -66,6 +68,7 @@ class March:
     def _given(self, inputs):
         """Inputs, controls that are held on each stage, and weights of modes with memory."""
         given = ComponentSet(v for u in inputs for v in u.values())
+        given.update(prescribed_states(self._model, self._wrt))
         for row in self._block.held.values():
             # the value at the end of its stage counts
             *others, last = sorted(variables_of([row.body]), key=self._times.time)
@@ -128,11 +131,11 @@ class March:
         equations = self._reader.first(first)
         states = [d.get_state_var() for d in derivatives(self._model, self._wrt)]
         refuse_free_start(equations, [v for x in states for v in x.values() if self._times.time(v) == first and not v.fixed])
-        if equations.unknown:
+        if equations.unknown and not find_first(equations, self._reader.sides(first), self._options, self._timer):
             with phase(self._timer, 'compile'):
                 window = Window(equations, self._options)
             with phase(self._timer, 'window'):
-                self._require(window.solve(equations))
+                self._require(window.solve(equations), equations, window)
             window.put_out(equations)
 
     def _through(self, shares):
@@ -218,16 +221,24 @@ class March:
             answer, h = kind.window_step(equations, most, options)
             if answer.stationarity == 'B' and h > least:
                 return kind.take_window(equations, most, h)
-        self._require(answer)
+        kind.window.force(equations, most / kind.nominal)
+        missed = largest_residuals(self._model, self._times, equations, kind.window.values)
+        forced = f"; where one is forced, {missed}" if missed else ''
+        if answer.stationarity == 'B':
+            raise self._stuck(
+                f"no step is possible from time {self._time:.6g}{forced}",
+                "look for a bound that the solution reaches there, or for a state from which no mode leads on",
+            )
         raise self._stuck(
-            f"no step is possible from time {self._time:.6g}",
-            "look for a bound that the solution reaches there, or for a state from which no mode leads on",
+            f"no step was found from time {self._time:.6g}: {answer.reason or answer.outcome}{forced}",
+            "check the equations there; more elements help where the solution is steep",
         )
 
     def _problem(self, element):
         if element.n not in self._equations:
-            limits = {name: rows for law in (*self._memories, self._jumps) for name, rows in law.limits(element).items()}
-            self._equations[element.n] = self._reader.element(element, limits)
+            with phase(self._timer, 'read'):
+                limits = {name: rows for law in (*self._memories, self._jumps) for name, rows in law.limits(element).items()}
+                self._equations[element.n] = self._reader.element(element, limits)
         return self._equations[element.n]
 
     def _warn_short(self):
@@ -246,11 +257,12 @@ class March:
                         least,
                     )
 
-    def _require(self, answer):
+    def _require(self, answer, equations, window):
         if answer.stationarity != 'B':
+            missed = largest_residuals(self._model, self._times, equations, window.values)
             raise self._stuck(
-                f"no solution at time {self._time:.6g}: {answer.reason}",
-                "check the equations there; more elements help where the solution is steep",
+                f"no solution at time {self._time:.6g}: {missed or answer.reason or answer.outcome}",
+                "check the equations there, and the initial values",
             )
 
     def _stuck(self, cause, fix):

@@ -6,14 +6,15 @@ With Z the side of every condition that is zero in the element and P the other o
 
 * All hold: the element is accepted.
 * One is negative at the end only: it has an arrival.  The same system with r free and P(1) = 0 (or the limit) gives the element
-  that ends there, P(1) by the polynomial through the stage values where P jumps (theory, eq. 13a).  From there on P is the zero side.
-* One is negative from the beginning: another active set holds.  P becomes the zero side: a slide; or so does one side of another
-  condition of the same origin too: the other mode.  The first of these that is consistent is accepted.
+  that ends there, P(1) by the polynomial through the stage values where P jumps (theory, eq. 13a).
+* One is negative from the beginning, or has just arrived at zero: P is a zero side from here on.  If that is all, it slides (or a
+  kink is passed); if one side of another condition of the same origin becomes zero too, the other mode begins.  All these active
+  sets are tried; if exactly one is consistent, it holds.
 
 Takes: ``Functions``, the active set and the end of the element before.
 Leaves: nothing.
-Does not apply: where Newton's method does not converge, the system is singular, a bound of another variable is violated, or none of
-these active sets is consistent.  Then it is None, and the window decides.
+Does not apply: where Newton's method does not converge, the system is singular, a bound of another variable is violated, or not
+exactly one active set is consistent.  Then it is None, and the window decides.
 """
 
 from dataclasses import dataclass
@@ -29,8 +30,8 @@ from pyomo_fesd.march.newton import System
 RELATIVE, ABSOLUTE = 1e-10, 1e-12
 #: Aggregated pairs are zero below this.
 ZERO = 1e-8
-#: So many active sets are tried, and so many arrivals in one element.
-TRIED = 8
+#: So many active sets are tried at once, and so many arrivals in one element; so often others are looked for.
+TRIED, ROUNDS = 8, 2
 #: An element that would end before this part of its length ends at its beginning.
 AT_ONCE = 1e-6
 
@@ -96,6 +97,12 @@ class Smooth:
         G, H = self._sums(values)
         return G >= H
 
+    def guess(self, w):
+        """An active set by the continuous sides only: the multipliers at ``w`` are a first guess."""
+        V, _ = self._f.at(w)
+        sides = V[self._f.signed][: 2 * len(self.names)].sum(axis=1)
+        return sides[1::2] <= ABSOLUTE
+
     def _sums(self, values):
         """The sums of both sides of every condition over the stages."""
         return values[: 2 * len(self.names), : self._stages.size].sum(axis=1).reshape(-1, 2).T
@@ -113,31 +120,44 @@ class Smooth:
         event : int, optional
             the side that is zero from there on
         """
-        waiting, tried = [active] if event is None else self._others(active, [event]), set()
-        while waiting and len(tried) < TRIED:
-            active = waiting.pop(0)
-            if active.tobytes() in tried:
-                continue
-            tried.add(active.tobytes())
-            w[self._f.length] = most
-            found = self._system(active).solve(w)
-            if found is None:
-                continue
-            values, negative = self._look(found, active)
-            if not negative:
-                return self._accept(found, most, active, values)
-            begins = {k: self._begins(k, values[k], left[k]) for k in negative}
-            wrong = [k for k in negative if begins[k] is None]
-            if not wrong:
-                return self._arrive(found, active, most, left, begins)
-            waiting += self._others(active, wrong)
-            # in another mode what jumps does not go on
-            left = np.where(self._f.continuous, left, np.nan)
+        wrong = [event]
+        if event is None:
+            step, wrong = self._try(w, active, most, left)
+            if step is not None or not wrong:
+                return step
+        # in another mode what jumps does not go on
+        left, sets, tried = np.where(self._f.continuous, left, np.nan), self._others(active, wrong), {active.tobytes()}
+        for _ in range(ROUNDS):
+            found, further = [], []
+            for other in sets[:TRIED]:
+                if other.tobytes() not in tried:
+                    tried.add(other.tobytes())
+                    step, wrong = self._try(w, other, most, left)
+                    found += [] if step is None else [step]
+                    further += self._others(other, wrong)
+            if found:
+                return found[0] if len(found) == 1 else None
+            sets = further
         return None
+
+    def _try(self, w, active, most, left):
+        """The element with one active set, or None; and functions that are negative from its beginning."""
+        start = w.copy()
+        if self._f.length is not None:
+            start[self._f.length] = most
+        found = self._system(active).solve(start)
+        if found is None:
+            return None, []
+        values, negative = self._look(found, active)
+        if not negative:
+            return self._accept(found, most, active, values), []
+        places = {k: self._begins(k, values[k], left[k]) for k in negative}
+        wrong = [k for k, place in places.items() if place is None]
+        return (None, wrong) if wrong else (self._arrive(found, active, most, left, places), [])
 
     def _others(self, active, wrong):
         """Active sets in which the ``wrong`` sides are zero: a slide, or with a condition of the same origin the other mode."""
-        if any(k >= 2 * active.size for k in wrong):
+        if not wrong or max(wrong) >= 2 * active.size:
             return []
         first = _flipped(active, wrong)
         choices = [(None, *(i for i in self._siblings[k // 2] if 2 * i not in wrong and 2 * i + 1 not in wrong)) for k in wrong]
@@ -159,7 +179,7 @@ class Smooth:
             starts = f.starts[zero]
             vanishing = np.concatenate([f.vanishing, *held, starts[starts >= 0]])
             columns = np.arange(f.lower.size)
-            if event is None:
+            if event is None and f.length is not None:
                 columns = np.delete(columns, f.length)
             self._systems[key] = System(f, vanishing, columns, None if event is None else self._arrival(event))
         return self._systems[key]

@@ -55,6 +55,14 @@ class Window:
             raise KeyboardInterrupt
         return results.extra_info
 
+    def force(self, equations, length):
+        """Ask for a given length, to see what keeps an element from having it; returns what is known of that."""
+        self._length.setlb(length)
+        try:
+            return self.solve(equations, length)
+        finally:
+            self._length.setlb(0)
+
     @property
     def length(self):
         """The length multiplier found."""

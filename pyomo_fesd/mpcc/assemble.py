@@ -30,12 +30,12 @@ def assemble(problem, entries, nl, handles, factors):
     s_sides = _factors_of_expressions(S, (w, p), (start * s_x, parameter_values(handles.parameters)), given)
 
     scale = Scale(s_x, s_g, s_f, _with_those_of_variables(s_sides, sides, layout, s_x))
-    graph = ca.Function('mpcc', [w, p], _outputs(layout, f, own, stack, S, scale))
     guides = [problem.artificial.get(v.parent_component(), (-np.inf, np.inf)) for v in variables]
     guide = np.array(guides, dtype=float).reshape(-1, 2)
     source = Source(variables, handles.parameters, _are_sides(sides, layout), guide, s_x, entries.splits)
     numbers = _numbers(problem, nl, layout, sides, scale, source, conditions, variables)
-    return Compiled(graph, numbers, variables, constraints, conditions, problem.decisions, source)
+    outputs = _outputs(layout, f, own, stack, S, scale)
+    return Compiled(w, p, outputs, numbers, variables, constraints, conditions, problem.decisions, source)
 
 
 def _substitute(nl, layout, s_x):
@@ -73,7 +73,7 @@ def _with_those_of_variables(factors, sides, layout, s_x):
 
 
 def _outputs(layout, f, own, stack, S, scale):
-    """What the graph returns, in the order of ``Compiled.NAMES``."""
+    """The functions of the MPCC, in the order of ``Compiled.NAMES``."""
     S, q = S * scale.sides, S.numel() // 2
     # term by term: the sum's order is that of the terms
     penalty = sum((stack[int(k)] for k in layout.penalty), ca.SX(0))

@@ -96,8 +96,8 @@ class Compiled:
 
     Parameters
     ----------
-    graph : casadi Function
-        (w, p) -> f, penalty, g (m), G, H (q), eta, equal (one each decision)
+    x, p : SX, symbols of the variables w (n) and of the parameters (l)
+    outputs : list of SX, in terms of these: f, penalty, g (m), G, H (q), eta, equal (one each decision)
     numbers : Numbers
     variables : list of VarData, length n
     constraints : list of ConstraintData, length m (rows of g)
@@ -113,13 +113,13 @@ class Compiled:
 
     NAMES = ('f', 'penalty', 'g', 'G', 'H', 'eta', 'equal')
 
-    def __init__(self, graph, numbers, variables=(), constraints=(), conditions=(), decisions=(), source=None):
-        self._graph, self._numbers = graph, numbers
+    def __init__(self, x, p, outputs, numbers, variables=(), constraints=(), conditions=(), decisions=(), source=None):
+        self._numbers = numbers
         self.__dict__.update(vars(numbers))
         self.variables, self.constraints, self.conditions, self.decisions = variables, constraints, conditions, decisions
         self._source = source
-        self.x, self.p = ca.SX.sym('w', graph.size1_in(0)), ca.SX.sym('p', graph.size1_in(1))
-        for name, expression in zip(self.NAMES, graph(self.x, self.p)):
+        self.x, self.p = x, p
+        for name, expression in zip(self.NAMES, outputs):
             setattr(self, name, expression)
         self._values = ca.Function('values', [self.x, self.p], [self.f, self.g, self.G, self.H, self.eta])
 
@@ -133,10 +133,14 @@ class Compiled:
         return ca.Function('gradients', [self.x, self.p], [self.derivatives.f, *self.derivatives.parts])
 
     def __getstate__(self):
-        return self._graph, self._numbers
+        # casadi pickles functions, not expressions
+        outputs = [getattr(self, name) for name in self.NAMES]
+        return ca.Function('mpcc', [self.x, self.p], outputs), self._numbers
 
     def __setstate__(self, state):
-        self.__init__(*state)
+        graph, numbers = state
+        x, p = ca.SX.sym('w', graph.size1_in(0)), ca.SX.sym('p', graph.size1_in(1))
+        self.__init__(x, p, graph(x, p), numbers)
 
     def refresh(self):
         """Read bounds, start and parameters from the model again; see ``Source.read``."""

@@ -38,7 +38,7 @@ OPTIONS = (
         'auto',
         In(['auto', *RELAXATIONS]),
         "form of Reg(eps): 'elastic' (one slack, weight 1/eps), 'scholtes' (products <= eps), others of the same kind, or "
-        "'auto': elastic without an objective, scholtes with one, the other after a failure",
+        "'auto': elastic, and after a failure or where nothing is certified paths that begin with scholtes",
     ),
     (
         'mode',

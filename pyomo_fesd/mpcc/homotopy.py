@@ -11,10 +11,15 @@ import numpy as np
 from pyomo_fesd.mpcc.active_set import ActiveSets, active_sets
 from pyomo_fesd.mpcc.nlp import NlpResult
 from pyomo_fesd.mpcc.recovery import LADDER
+from pyomo_fesd.mpcc.stationarity import Stationarity
 
-#: Without an objective any solution will do, and the elastic form is by far the quickest to one; with an objective it settles
-#: early in worse minima than Scholtes' (gas-liquid optimal control: 250.005 instead of 250).  A failure changes the form.
-AUTO = {False: ('elastic', 'scholtes'), True: ('scholtes', 'elastic')}
+#: For each path the form of its first relaxation and that of the others, without an objective and with one.  The elastic form is by
+#: far the quickest; Scholtes' at the first eps puts every pair in the middle, whatever the size of the objective.  The next path
+#: is for what the one before does not settle.
+AUTO = {
+    False: (('elastic', 'elastic'), ('scholtes', 'scholtes')),
+    True: (('elastic', 'elastic'), ('scholtes', 'elastic'), ('scholtes', 'scholtes')),
+}
 #: From this eps on multipliers are carried along; before, Ipopt's own centring finds better minima (a car: 13.3, not 16).
 CARRIED = 1e-2
 #: From this eps on a relaxation is worth a branch NLP, which is much cheaper than the next relaxation, unless more than this part
@@ -28,11 +33,12 @@ ROUND_OFF = 1.001
 
 @dataclass(frozen=True)
 class _Stage:
-    """The next relaxation: its form, where it starts, and what the one before has shown."""
+    """The next relaxation: its path, where it starts, and the form and the result of the one before, with what it has shown."""
 
-    form: int
+    path: int
     w: np.ndarray
     eps: float
+    before: str = None
     duals: NlpResult = None
     sets: ActiveSets = None
     named: float = None
@@ -58,7 +64,7 @@ class Homotopy:
     def __init__(self, compiled, options, steps, gap, branches, after, start):
         self._c, self._options, self._steps, self._gap, self._branches = compiled, options, steps, gap, branches
         self._after, self._start, self.run = after, start, steps.run
-        self._forms = (options.relaxation,) if options.relaxation != 'auto' else AUTO[compiled.has_objective]
+        self._paths = AUTO[compiled.has_objective] if options.relaxation == 'auto' else ((options.relaxation,) * 2,)
         self._ladder = list(LADDER)
         self.end, self.finished = None, False
 
@@ -70,14 +76,22 @@ class Homotopy:
         stage = _Stage(0, self._start, self._options.eps_init)
         while stage is not None:
             self.run.eps = stage.eps
-            carried = stage.duals if stage.eps <= CARRIED * ROUND_OFF else None
-            relaxed = self._steps.relax(self._forms[stage.form], stage.w, stage.eps, carried, self._budget(carried))
+            form = self._form(stage)
+            carried = stage.duals if stage.eps <= CARRIED * ROUND_OFF and stage.before == form else None
+            relaxed = self._steps.relax(form, stage.w, stage.eps, carried, self._budget(stage, carried))
             self._steps.keep_least_infeasible(relaxed.w)
             stage = self._next(stage, relaxed) if self._steps.usable(relaxed) else self._recover(stage, relaxed)
 
-    def _budget(self, carried):
-        """Iterations of a relaxation; None, for all that the solver has, where it starts from afar or the user has set them."""
-        return None if carried is None or 'max_iter' in self._options.nlp_options else self._options.relaxation_iterations
+    def _form(self, stage):
+        first, later = self._paths[stage.path]
+        return first if stage.before is None else later
+
+    def _budget(self, stage, carried):
+        """Iterations of a relaxation; None, for all that the solver has, where it starts from afar on the last path, or the user
+        has set them.
+        """
+        afar = carried is None and stage.path + 1 == len(self._paths)
+        return None if afar or 'max_iter' in self._options.nlp_options else self._options.relaxation_iterations
 
     def restore(self, w):
         """The nearest point that the feasibility phase finds, with pairs as loose as at the start."""
@@ -95,7 +109,7 @@ class Homotopy:
         if step.other_form and self._c.widen() and self._branches is not None:
             self._branches.forget()
         eps = max(step.eps(options.eps_init, stage.eps, options.eps_factor), options.eps_final)
-        return _Stage((stage.form + step.other_form) % len(self._forms), step.start(self._start, relaxed.w, self), eps)
+        return _Stage((stage.path + step.other_form) % len(self._paths), step.start(self._start, relaxed.w, self), eps)
 
     def _next(self, stage, relaxed):
         """Explore what the relaxation shows; the stage after it, or None."""
@@ -115,7 +129,7 @@ class Homotopy:
             return self._other_form(stage, relaxed)
         # nothing changes before eps falls below the largest product
         eps = max(min(stage.eps, product) * options.eps_factor, options.eps_final)
-        return _Stage(stage.form, relaxed.w, eps, relaxed, sets, named)
+        return _Stage(stage.path, relaxed.w, eps, self._form(stage), relaxed, sets, named)
 
     def _telling(self, stage, sets):
         """Whether the active sets are worth a branch NLP."""
@@ -130,17 +144,21 @@ class Homotopy:
         return None not in (before, now) and max(before, now) - best <= same
 
     def _other_form(self, stage, relaxed):
-        """Where a path ends with nothing feasible: the same with wider bounds, then the other form."""
-        if self._branches is None or self.run.point is not None:
+        """Where a path ends with nothing certified: the same with shorter elements if they may be missing, then the next path."""
+        if self._branches is None or self._certified():
             return None
-        wider = self._c.widen()
-        form = stage.form + (not wider)
-        if form == len(self._forms):
+        wider = self._short_of_lengths() and self._c.widen()
+        path = stage.path + (not wider)
+        if path == len(self._paths):
             return None
-        self._steps.note("nothing feasible on this path, " + ("shorter elements" if wider else "other form"), relaxed.w)
+        self._steps.note("nothing certified on this path, " + ("shorter elements" if wider else "other form"), relaxed.w)
         self._gap.restart()
         self._branches.forget()
-        return _Stage(form, self._start, self._options.eps_init)
+        return _Stage(path, self._start, self._options.eps_init)
+
+    def _short_of_lengths(self):
+        """Whether there is nothing feasible, or what only a bound of the method keeps from descending."""
+        return self.run.point is None or self.run.point.certificate.grade is Stationarity.LIMITED
 
     def _certified(self):
         return self.run.point is not None and self.run.point.certificate.certified

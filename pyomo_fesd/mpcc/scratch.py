@@ -118,8 +118,8 @@ def _varies(expr):
     waiting = [expr]
     while waiting:
         node = waiting.pop()
-        if node.is_variable_type():
-            if node.fixed:
+        if not node.is_expression_type():
+            if node.is_fixed():
                 return False
         elif isinstance(node, ProductExpression):
             # each factor has to vary: one may be 0
@@ -127,10 +127,11 @@ def _varies(expr):
             if not all(map(is_potentially_variable, factors)):
                 return False
             waiting += factors
-        elif isinstance(node, WHOLE) or not node.is_expression_type():
-            return False
         else:
-            waiting.append(next(filter(is_potentially_variable, node.args)))
+            first = None if isinstance(node, WHOLE) else next(filter(is_potentially_variable, node.args), None)
+            if first is None:
+                return False
+            waiting.append(first)
     return True
 
 

@@ -1,0 +1,124 @@
+"""Pure simulation by hand: scipy's integrators, every switch located by an event, every slide written as a mode of its own."""
+
+from math import exp
+
+import gas_liquid_tank as tank
+import numpy as np
+import oscillator
+import scale_cascade as cascade
+import thermostat
+from scipy.integrate import solve_ivp
+
+
+def integrate(x, horizon, mode, rhs, events, method, tolerance):
+    """Mode by mode.
+
+    Parameters
+    ----------
+    rhs : function (mode) -> function (t, x)
+    events : function (mode) -> list of (function (t, x), mode that follows)
+
+    Returns
+    -------
+    list of switching times, array x at the end
+    """
+    time, switches = 0.0, []
+    while True:
+        found = events(mode)
+        functions = [function for function, _ in found]
+        for function in functions:
+            function.terminal = True
+        run = solve_ivp(rhs(mode), (time, horizon), x, method, events=functions, rtol=tolerance, atol=tolerance)
+        time, x = run.t[-1], run.y[:, -1]
+        if run.status != 1:
+            return switches, x
+        switches.append(time)
+        mode = next(after for times, (_, after) in zip(run.t_events, found) if len(times))
+
+
+def tank_by_hand(method, tolerance):
+    """Liquid mode, then the slide on the outlet: nu L = F_L."""
+
+    def out(x):
+        return tank.VALVE * (x[0] * tank.R * tank.T / (tank.V - x[1] / tank.RHO_L) - tank.P_OUT)
+
+    def liquid(t, x):
+        return [tank.F_G, tank.F_L - out(x)]
+
+    def slide(t, x):
+        return [tank.F_G - (1 - tank.F_L / out(x)) * out(x), 0.0]
+
+    def level(t, x):
+        return x[1] / tank.RHO_L - tank.V_S
+
+    modes = {'liquid': (liquid, [(level, 'slide')]), 'slide': (slide, [])}
+    start = [tank.M_G0, tank.M_L0]
+    (t_s,), x = integrate(start, tank.HORIZON, 'liquid', lambda m: modes[m][0], lambda m: modes[m][1], method, tolerance)
+    return max(abs(t_s - tank.EXACT['t_s']) / t_s, abs(x[0] / tank.EXACT['M_G'] - 1))
+
+
+def oscillator_by_hand(method, tolerance):
+    """Inside, then outside."""
+    A = {'inside': np.array(oscillator.A_INSIDE), 'outside': np.array(oscillator.A_OUTSIDE)}
+
+    def circle(t, x):
+        return x[0] ** 2 + x[1] ** 2 - 1
+
+    found = {'inside': [(circle, 'outside')], 'outside': []}
+    (t_s,), x = integrate(
+        oscillator.X0, oscillator.HORIZON, 'inside', lambda m: lambda t, x: A[m] @ x, lambda m: found[m], method, tolerance
+    )
+    return max(abs(t_s - oscillator.SWITCH), *np.abs(x - oscillator.X_END))
+
+
+def thermostat_end(horizon):
+    """The temperature at the end, by the exponentials."""
+    times = [0.0, *thermostat.switching_times(horizon), horizon]
+    y, heating = thermostat.START, True
+    for a, b in zip(times, times[1:]):
+        rest = 50.0 if heating else 0.0
+        y, heating = rest + (y - rest) * exp(-(b - a) / 5), not heating
+    return y
+
+
+def thermostat_by_hand(method, tolerance, horizon):
+    """Heating and cooling in turn."""
+
+    def high(t, y):
+        return y[0] - thermostat.HIGH
+
+    def low(t, y):
+        return y[0] - thermostat.LOW
+
+    rhs = {'heating': lambda t, y: [10 - y[0] / 5], 'cooling': lambda t, y: [-y[0] / 5]}
+    found = {'heating': [(high, 'cooling')], 'cooling': [(low, 'heating')]}
+    start = [thermostat.START]
+    switches, y = integrate(start, horizon, 'heating', rhs.get, found.get, method, tolerance)
+    exact = thermostat.switching_times(horizon)
+    if len(switches) != len(exact):
+        return float('inf')
+    return max(*np.abs(np.subtract(switches, exact)), abs(y[0] - thermostat_end(horizon)))
+
+
+def cascade_by_hand(method, tolerance, S=20):
+    """A mode is the set of heads that are not full yet; what is full lets through what is too much."""
+    surplus = np.array([cascade._surplus(k, S) for k in range(S)])
+
+    def rhs(waiting):
+        def field(t, x):
+            dx, above = np.zeros(S), 0.0
+            for k in range(S):
+                inflow = surplus[k] + cascade.LOSS + above - cascade.LOSS * x[k]
+                dx[k], above = (inflow, 0.0) if k in waiting else (0.0, inflow)
+            return dx
+
+        return field
+
+    def events(waiting):
+        return [(lambda t, x, k=k: x[k] - 1, waiting - {k}) for k in waiting]
+
+    heads = frozenset(cascade.heads(S))
+    start = [1.0 - (cascade.DEFICIT if k in heads else 0.0) for k in range(S)]
+    switches, _ = integrate(start, cascade.HORIZON, heads, rhs, events, method, tolerance)
+    exact = [t for t in cascade.exact(S) if t < cascade.HORIZON]
+    return max(np.abs(np.subtract(switches, exact))) if len(switches) == len(exact) else float('inf')
