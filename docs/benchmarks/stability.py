@@ -87,7 +87,12 @@ def shares(runs):
     return pd.DataFrame(rows)
 
 
-def draw(table):
+def unstated(runs):
+    """The families and methods that cannot state any case."""
+    return {pair for pair, group in runs.groupby(['family', 'method']) if (group['class'] == '-').all()}
+
+
+def draw(table, unstated):
     """Stacked bars: one for each family and method."""
     families = list(dict.fromkeys(table['family']))
     figure = Figure(figsize=(12, 0.36 * len(families) + 1.4), layout='constrained')
@@ -100,11 +105,12 @@ def draw(table):
             left = left + part
         for k, family in enumerate(families):
             if pd.isna(own.loc[family, 'runs']):
-                axis.text(50, k, '–', ha='center', va='center', color='0.5')
+                text = '–' if (family, method) in unstated else 'not run'
+                axis.text(50, k, text, ha='center', va='center', color='0.5')
         axis.set_title(method, fontsize='medium')
         axis.set_xlim(0, 100)
         axis.set_xlabel('% of runs')
-    axis.invert_yaxis()
+    axis.set_ylim(len(families) - 0.4, -0.6)
     handles, labels = axis.get_legend_handles_labels()
     figure.legend(handles, labels, loc='outside upper center', ncols=len(CLASSES), frameon=False)
     return figure
@@ -118,9 +124,10 @@ def main():
     parser.add_argument('--methods', nargs='*')
     parser.add_argument('--limit', type=float, default=20.0)
     measure(parser.parse_args())
-    table = shares(pd.read_csv(RUNS))
+    runs = pd.read_csv(RUNS)
+    table = shares(runs)
     table.to_csv(SHARES, index=False)
-    draw(table).savefig(PICTURE, dpi=150)
+    draw(table, unstated(runs)).savefig(PICTURE, dpi=110)
     with pd.option_context('display.width', 250, 'display.max_rows', None, 'display.max_colwidth', 60):
         print(table.to_string(index=False))
 
