@@ -40,6 +40,9 @@ LIMIT = 120
 PHASES = ('build', 'transform', 'simulate', 'compile', 'NLPs', 'LPECs', 'load', 'total')
 #: Sizes below this part of the largest do not count for a slope: there fixed costs show.
 FITTED = 1 / 20
+#: Phases that never take more seconds than this are left out.
+SHOWN = 0.2
+SHARE = 'transform and compile / total, at a quarter of the largest size'
 TABLE, FITS, PICTURE = (HERE / name for name in ('scale.csv', 'scale_fit.csv', 'scale.png'))
 
 
@@ -167,9 +170,11 @@ def fit(table):
     """Exponents of each phase and of the peak of memory."""
     rows = []
     for (problem, method), runs in table[table['status'] == 'B'].groupby(['problem', 'method'], sort=False):
-        exponents = {phase: slope(runs['size'], runs[phase]) for phase in PHASES if phase in runs and runs[phase].max() > 0.01}
+        exponents = {phase: slope(runs['size'], runs[phase]) for phase in PHASES if runs[phase].max() > SHOWN}
         peak = slope(runs['size'], runs['MB at the end'] - runs['MB before'])
-        rows.append({'problem': problem, 'method': method} | exponents | {'memory': peak})
+        quarter = runs[runs['size'] == max(SIZES[problem][1]) // 4]
+        share = ((quarter['transform'] + quarter['compile']) / quarter['total']).mean()
+        rows.append({'problem': problem, 'method': method} | exponents | {'memory': peak, SHARE: share})
     return pd.DataFrame(rows)
 
 
@@ -177,24 +182,28 @@ def draw(table, fits):
     """Time by phase and memory, log-log, with the slopes."""
     figure = Figure(figsize=(12, 9), layout='constrained')
     axes = figure.subplots(len(SIZES), 3, squeeze=False)
-    for row, (problem, (letter, _)) in zip(axes, SIZES.items()):
+    for row, (problem, (letter, sizes)) in zip(axes, SIZES.items()):
         for axis, method in zip(row, METHODS):
             runs = table[(table['problem'] == problem) & (table['method'] == method) & (table['status'] == 'B')]
             exponents = fits[(fits['problem'] == problem) & (fits['method'] == method)]
             for phase in PHASES:
-                if phase in exponents and np.isfinite(exponents[phase]).all():
+                if phase in exponents and np.isfinite(exponents[phase]).any():
                     width = 2.5 if phase == 'total' else 1.2
                     label = f'{phase}: {letter}^{exponents[phase].iloc[0]:.2f}'
                     axis.loglog(runs['size'], runs[phase], 'o-', linewidth=width, markersize=3, label=label)
             axis.set_title(f'{problem}, {method}')
             axis.set_ylabel('time (s)')
-            row[2].loglog(runs['size'], runs['MB at the end'] - runs['MB before'], 'o-', markersize=3, label=method)
-        row[2].set_title(f'{problem}, peak of memory above that of the imports')
+            slopes = f': {letter}^{exponents["memory"].iloc[0]:.2f}' if len(exponents) else ''
+            row[2].loglog(runs['size'], runs['MB at the end'] - runs['MB before'], 'o-', markersize=3, label=method + slopes)
+        row[2].set_title(f'{problem}, peak of memory above the imports')
         row[2].set_ylabel('MB')
         for axis in row:
             axis.set_xlabel('elements N' if letter == 'N' else 'tanks S')
-            axis.legend(fontsize=8)
-            axis.grid(True, which='both', alpha=0.2)
+            axis.set_xticks(sizes, sizes)
+            axis.minorticks_off()
+            if axis.get_legend_handles_labels()[0]:
+                axis.legend(fontsize=8, loc='upper left')
+            axis.grid(True, alpha=0.2)
     figure.savefig(PICTURE, dpi=120)
 
 

@@ -211,4 +211,4 @@ def _shares(axis, rows):
     bars = axis.barh(names, shares, color=['C3', 'C0', 'C9', 'C2', 'C4', 'C4'][: len(names)])
     axis.bar_label(bars, [f'{share:.0f} %' for share in shares], padding=3)
     axis.invert_yaxis()
-    axis.set(xlim=(0, 140), xlabel='right answers from 50 starts (%)', title='one minimum, 50 starts')
+    axis.set(xlim=(0, 140), xlabel='right answers (%)', title='one minimum, 50 starts')

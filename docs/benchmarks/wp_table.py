@@ -101,6 +101,7 @@ RUNS = [
     *_runs('signum', EVENTS, width=(1e-6, 1e-10), scheme=('',)),
     *_runs('tank', OURS, (1, 2, 3, 4), (12, 25, 50, 100), scheme=BOTH),
     *_runs('tank', MARCH, (2, 3, 4), (12, 25, 100)),
+    *_runs('tank', (OURS, MARCH, *NOSNOCS), (6, 8), (4, 8)),
     *_runs('tank', REFINE, (4,), width=(1e-4, 1e-6, 1e-8, 1e-10)),
     *_runs('tank', FIXED, (1, 2, 3), (25, 100, 400)),
     *_runs('tank', SMOOTH, (3,), (50,), WIDTHS),

@@ -39,7 +39,7 @@ NO_STEP = 1e-9
 #: A step that is shorter than its share by more than this has been cut short by an event.
 CUT = 1e-7
 #: Lengths between two switches are equal if they differ by less than this part; what is left after so many marches may be larger.
-EQUAL, NEARLY, PASSES = 1e-11, 1e-7, 6
+EQUAL, NEARLY, PASSES = 1e-10, 1e-7, 6
 #: How an element is tried, one after the other: from where the last one ended; from afar; with other starts.  A step of no
 #: length is a local solution of its own where a switch lies on the left boundary, so the later ones look farther.
 TRIES = (
@@ -230,7 +230,7 @@ class March:
                 "look for a bound that the solution reaches there, or for a state from which no mode leads on",
             )
         raise self._stuck(
-            f"no step was found from time {self._time:.6g}: {answer.reason or answer.outcome}{forced}",
+            f"no step was found from time {self._time:.6g}: {answer.outcome}{forced}",
             "check the equations there; more elements help where the solution is steep",
         )
 

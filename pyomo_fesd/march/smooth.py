@@ -19,7 +19,7 @@ exactly one active set is consistent.  Then it is None, and the window decides.
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
@@ -161,7 +161,8 @@ class Smooth:
             return []
         first = _flipped(active, wrong)
         choices = [(None, *(i for i in self._siblings[k // 2] if 2 * i not in wrong and 2 * i + 1 not in wrong)) for k in wrong]
-        return [_flipped(first, [2 * i + 1 - first[i] for i in more if i is not None]) for more in product(*choices)]
+        some = islice(product(*choices), TRIED)
+        return [_flipped(first, [2 * i + 1 - first[i] for i in more if i is not None]) for more in some]
 
     @cached_property
     def _siblings(self):

@@ -103,6 +103,8 @@ class Homotopy:
         self._after(self.run)
         if not self._ladder or self._certified():
             return None
+        if self._fails_at_once(stage):
+            return self._begin(stage.path + 1, "start again, other form", relaxed)
         step, options = self._ladder.pop(0), self._options
         self._steps.note(step.what, relaxed.w)
         self._gap.restart()
@@ -110,6 +112,11 @@ class Homotopy:
             self._branches.forget()
         eps = max(step.eps(options.eps_init, stage.eps, options.eps_factor), options.eps_final)
         return _Stage((stage.path + step.other_form) % len(self._paths), step.start(self._start, relaxed.w, self), eps)
+
+    def _fails_at_once(self, stage):
+        """Whether a path ends where it begins: there is nothing to go back to, and the forms differ most at their first eps."""
+        first = stage.before is None and len(self._ladder) == len(LADDER)
+        return first and self._branches is not None and stage.path + 1 < len(self._paths)
 
     def _next(self, stage, relaxed):
         """Explore what the relaxation shows; the stage after it, or None."""
@@ -151,7 +158,11 @@ class Homotopy:
         path = stage.path + (not wider)
         if path == len(self._paths):
             return None
-        self._steps.note("nothing certified on this path, " + ("shorter elements" if wider else "other form"), relaxed.w)
+        return self._begin(path, "nothing certified on this path, " + ("shorter elements" if wider else "other form"), relaxed)
+
+    def _begin(self, path, why, relaxed):
+        """The first stage of another path."""
+        self._steps.note(why, relaxed.w)
         self._gap.restart()
         self._branches.forget()
         return _Stage(path, self._start, self._options.eps_init)

@@ -655,7 +655,9 @@ def test_options_reach_the_solver():
 
 
 def test_interrupted():
-    m = transform(signum.build(), 4)
+    m = signum.build()
+    m.x[0].fix(0.0)
+    transform(m, 4)
     before = bare(m)
 
     def stop(progress):
