@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 HERE = Path(__file__).parent
 TABLE, PICTURE = HERE / 'idaes_size.csv', HERE / 'idaes_size.png'
-SIZES, NCP, LIMIT = (20, 60, 120, 400), 2, 150
+SIZES, NCP, LIMIT = (20, 60, 120, 400), 3, 200
 PHASES = ('build', 'discretise', 'initialise', 'march', 'solve')
 
 
@@ -98,7 +98,7 @@ def main():
             continue
         row = in_own_process(nfe)
         print(row, flush=True)
-        table = pd.concat([table, pd.DataFrame([row])]).sort_values('elements').astype({'elements': int})
+        table = pd.concat([table, pd.DataFrame([row])]).sort_values('elements').convert_dtypes()
         table.to_csv(TABLE, index=False)
     if {f'{phase} (s)' for phase in PHASES} <= set(table.columns):
         draw(table)
