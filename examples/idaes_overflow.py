@@ -57,10 +57,10 @@ def build():
     return m
 
 
-def plant():
+def plant(times=(0, END)):
     """Mixer and adiabatic CSTR; nothing says yet how much leaves the vessel (m3/s): one degree of freedom at each time."""
     m = pyo.ConcreteModel()
-    m.fs = FlowsheetBlock(dynamic=True, time_set=[0, END], time_units=pyo.units.s)
+    m.fs = FlowsheetBlock(dynamic=True, time_set=list(times), time_units=pyo.units.s)
     m.fs.props = SaponificationParameterBlock()
     m.fs.kinetics = SaponificationReactionParameterBlock(property_package=m.fs.props)
     m.fs.mixer = Mixer(
@@ -128,20 +128,33 @@ def initialise(m):
     The guess is a vessel that fills and then stays full, with most of its feed converted; every other variable follows from
     one equation at a time.  From Pyomo's own initial values Ipopt fails even if the outflow is given.
     """
-    cv = m.fs.cstr.control_volume
     feed = dict.fromkeys(SOLUTES, 0.0) | dict(H2O=m.fs.props.dens_mol, NaOH=FEED_CONC / 2, EthylAcetate=FEED_CONC / 2)
-    contents = dict.fromkeys(SOLUTES, FEED_CONC / 2) | dict(H2O=m.fs.props.dens_mol, NaOH=1.0, EthylAcetate=1.0)
     for t in m.fs.time:
         guess_state(m.fs.mixer.mixed_state[t], INFLOW, feed)
-        guess_state(cv.properties_in[t], INFLOW, feed)
-        guess_state(cv.properties_out[t], INFLOW / 2, contents)
-        cv.volume[t].set_value(min(START_VOLUME + INFLOW * t, CREST_VOLUME))
+    volumes = {t: min(START_VOLUME + INFLOW * t, CREST_VOLUME) for t in m.fs.time}
+    guess_reactor(m.fs.cstr, volumes, INFLOW, feed)
     specify(m)
-    for t in m.fs.time:
+    settle_reactor(m.fs.cstr)
+
+
+def guess_reactor(reactor, volumes, inflow, feed):
+    """Set the streams (m3/s, mol/m3) and the volumes (m3) over time of a reactor that converts most of its feed."""
+    cv = reactor.control_volume
+    contents = dict.fromkeys(SOLUTES, FEED_CONC / 2) | dict(H2O=feed['H2O'], NaOH=1.0, EthylAcetate=1.0)
+    for t, volume in volumes.items():
+        guess_state(cv.properties_in[t], inflow, feed)
+        guess_state(cv.properties_out[t], inflow / 2, contents)
+        cv.volume[t].set_value(volume)
+
+
+def settle_reactor(reactor):
+    """Let the other variables of a reactor follow from its streams and volume."""
+    cv = reactor.control_volume
+    for t in cv.volume:
         calculate(cv.reactions[t].k_rxn, cv.reactions[t].arrhenius_eqn)
         calculate(cv.reactions[t].reaction_rate['R1'], cv.reactions[t].rate_expression['R1'])
-        calculate(cv.rate_reaction_extent[t, 'R1'], m.fs.cstr.cstr_performance_eqn[t, 'R1'])
-        for i in ((t, 'Liq', j) for j in contents):
+        calculate(cv.rate_reaction_extent[t, 'R1'], reactor.cstr_performance_eqn[t, 'R1'])
+        for i in ((t, 'Liq', j) for j in ('H2O', *SOLUTES)):
             calculate(cv.rate_reaction_generation[i], cv.rate_reaction_stoichiometry_constraint[i])
             calculate(cv.material_holdup[i], cv.material_holdup_calculation[i])
             calculate(cv.material_accumulation[i], cv.material_balances[i])

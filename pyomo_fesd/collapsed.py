@@ -21,8 +21,9 @@ def collapsed(model, wrt, functions):
     block = records(model).grids[wrt]
     for element in grid_of(block).elements:
         if abs(block.r[element.n].value - LEAST) <= AT_LEAST * LEAST:
+            when = physical_time(model, wrt)[element.left]
             yield (
-                f"{wrt.name}: element {element.n} has collapsed into a point at time {physical_time(model, wrt)[element.left]:.6g}, "
-                "where any mode would do: the solution may not be one. Take another number of elements (nfe)."
+                f"{wrt.name}: element {element.n} has collapsed into a point at time {when:.6g}, where any mode would "
+                "do: the solution may not be one. Take another number of elements (nfe)."
             )
             break

@@ -10,6 +10,7 @@ Leaves: nothing.
 Does not apply: to what numbers alone tell (two parallel equations), and to inequalities.
 """
 
+import re
 from collections import Counter
 from dataclasses import dataclass
 
@@ -30,6 +31,7 @@ from pyomo_fesd.elements.mixed import replacement, source
 from pyomo_fesd.records import records
 from pyomo_fesd.timeindex import TimeIndex
 
+INDEX = re.compile(r'\[[^\]]*\]')
 #: Names that a message lists.
 SHOWN = 3
 #: Fixed values may miss an equation between them by this much, as in Pyomo's NL writer.
@@ -197,8 +199,8 @@ def _few(names, number):
 
 
 def _home(component):
-    """The block of a component, whatever its index; with StateBlocks it is a time."""
-    return _name(component.parent_block().parent_component())
+    """The block of a component without its indices, among which is time."""
+    return INDEX.sub('', _name(component.parent_block()))
 
 
 def _name(block):

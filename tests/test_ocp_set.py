@@ -1,11 +1,10 @@
-"""The optimal control set: solved and certified at the defaults, at the minimum that is known; and the judge that replays controls."""
+"""The optimal control set: certified at the defaults, at the minimum that is known; and the judge that replays controls."""
 
 from importlib import import_module
 
 import numpy as np
 import ocp
 import ocp_replay
-import pyomo.environ as pyo
 import pytest
 
 #: A coarse grid's error of the objective, relative.

@@ -31,7 +31,8 @@ def summary(rows):
     table['starts at the reference'] = starts.groupby(['problem', 'method']).reached.sum()
     ours = table.seconds.xs('pyomo_fesd', level='method')
     table['time / ours'] = table.seconds / ours.reindex(table.index.get_level_values('problem')).to_numpy()
-    return table.reindex([p for p in PROBLEMS if p in ours.index], level='problem').round(5)
+    table = table.reindex(pd.MultiIndex.from_product([PROBLEMS, STYLE], names=table.index.names)).dropna(how='all')
+    return table.map(lambda value: float(f'{value:.6g}') if isinstance(value, float) else value)
 
 
 def draw(table):
@@ -41,7 +42,7 @@ def draw(table):
     problems = list(dict.fromkeys(table.index.get_level_values('problem')))
     for k, (method, style) in enumerate(STYLE.items()):
         part = table.xs(method, level='method').reindex(problems)
-        places = [row + 0.2 - 0.4 * k for row in range(len(problems))]
+        places = [row - 0.2 + 0.4 * k for row in range(len(problems))]
         bars = left.barh(places, part['time / ours'].fillna(0), 0.38, edgecolor='0.15', label=method, **style)
         left.bar_label(bars, [f' {s:.2f} s' if s == s else ' cannot state it' for s in part.seconds], fontsize='small')
         share = part['starts at the reference'] / part['starts']

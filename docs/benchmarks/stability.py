@@ -26,6 +26,8 @@ from stability_worker import Worker  # noqa: E402
 
 METHODS = ('mpec_hybrid', 'simulate', 'fixed grid', 'smoothing', 'nosnoc')
 COLUMNS = ('family', 'case', 'start', 'method', 'class', 'error', 'looks', 'said', 'seconds')
+#: Starts of a family that are run before those of the next one.
+BLOCK = 10
 RUNS, SHARES, PICTURE = HERE / 'stability.csv', HERE / 'stability_shares.csv', HERE / 'stability.png'
 COLORS = {'right': '#3a923a', 'refused': '#9ecae1', 'silently within 1 %': '#fdae6b', 'silently wrong': '#d62728'}
 
@@ -46,8 +48,8 @@ def measure(options):
         writer = csv.DictWriter(file, COLUMNS, lineterminator='\n')
         if not done:
             writer.writeheader()
-        # ten starts of every family, then ten more
-        for number, case in sorted(enumerate(everything), key=lambda pair: pair[1].seed // 10):
+        # some starts of every family, then some more
+        for number, case in sorted(enumerate(everything), key=lambda pair: pair[1].seed // BLOCK):
             for method in METHODS:
                 row = {'family': case.family, 'case': case.name, 'start': case.seed, 'method': method}
                 if key(row) in done or not re.search(options.only, case.family) or method not in (options.methods or METHODS):
@@ -85,7 +87,12 @@ def shares(runs):
     return pd.DataFrame(rows)
 
 
-def draw(table):
+def unstated(runs):
+    """The families and methods that cannot state any case."""
+    return {pair for pair, group in runs.groupby(['family', 'method']) if (group['class'] == '-').all()}
+
+
+def draw(table, unstated):
     """Stacked bars: one for each family and method."""
     families = list(dict.fromkeys(table['family']))
     figure = Figure(figsize=(12, 0.36 * len(families) + 1.4), layout='constrained')
@@ -98,11 +105,12 @@ def draw(table):
             left = left + part
         for k, family in enumerate(families):
             if pd.isna(own.loc[family, 'runs']):
-                axis.text(50, k, '–', ha='center', va='center', color='0.5')
+                text = '–' if (family, method) in unstated else 'not run'
+                axis.text(50, k, text, ha='center', va='center', color='0.5')
         axis.set_title(method, fontsize='medium')
         axis.set_xlim(0, 100)
         axis.set_xlabel('% of runs')
-    axis.invert_yaxis()
+    axis.set_ylim(len(families) - 0.4, -0.6)
     handles, labels = axis.get_legend_handles_labels()
     figure.legend(handles, labels, loc='outside upper center', ncols=len(CLASSES), frameon=False)
     return figure
@@ -116,9 +124,10 @@ def main():
     parser.add_argument('--methods', nargs='*')
     parser.add_argument('--limit', type=float, default=20.0)
     measure(parser.parse_args())
-    table = shares(pd.read_csv(RUNS))
+    runs = pd.read_csv(RUNS)
+    table = shares(runs)
     table.to_csv(SHARES, index=False)
-    draw(table).savefig(PICTURE, dpi=150)
+    draw(table, unstated(runs)).savefig(PICTURE, dpi=110)
     with pd.option_context('display.width', 250, 'display.max_rows', None, 'display.max_colwidth', 60):
         print(table.to_string(index=False))
 

@@ -1,7 +1,7 @@
 """Accuracy against time: problems x methods, one row for each run.
 
     .venv/bin/pip install nosnoc==0.2.0
-    .venv/bin/python docs/benchmarks/work_precision.py [--only tank,nosnoc] [--limit 30] [--fresh] [--summary]
+    .venv/bin/python docs/benchmarks/work_precision.py [--only tank,nosnoc] [--limit 20] [--fresh] [--summary]
 
 Each run appends a row to work_precision.csv beside this file, and no run is done twice (``--fresh`` begins anew).  At the end, or
 at once with ``--summary``, the pictures are drawn and the targets printed.  A run happens in a child process, which is replaced
@@ -106,7 +106,7 @@ def main():
     """Run what is missing, then draw and judge."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--only', type=lambda text: set(text.split(',')), help="problems or methods, by name")
-    parser.add_argument('--limit', type=float, default=30.0, help="seconds for each run")
+    parser.add_argument('--limit', type=float, default=20.0, help="seconds for each run")
     parser.add_argument('--fresh', action='store_true', help="forget the rows that are there")
     parser.add_argument('--summary', action='store_true', help="run nothing")
     arguments = parser.parse_args()

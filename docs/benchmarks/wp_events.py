@@ -45,6 +45,6 @@ def events(problem, width, **_):
             break
         switch = time if switch is None else switch
         mode = NEXT[drift(x, system.above) > 0, drift(x, system.below) > 0]
-    found = Found(run.message[:60], run.status == 0, 0.0, perf_counter() - started)
+    found = Found('integrated' if run.status == 0 else run.message, run.status == 0, 0.0, perf_counter() - started)
     found.state, found.switch = list(x), switch
     return found

@@ -23,6 +23,8 @@ from pyomo_fesd.accuracy.solution import read_solution
 from pyomo_fesd.accuracy.solver import Solver
 from pyomo_fesd.accuracy.table import ERRORS, Refinement, Table
 from pyomo_fesd.elements.grid import share_elements
+from pyomo_fesd.excursions import excursions
+from pyomo_fesd.switching import switching_functions
 from pyomo_fesd.timeindex import find_continuous_set
 
 logger = logging.getLogger('pyomo_fesd')
@@ -31,6 +33,8 @@ logger = logging.getLogger('pyomo_fesd')
 FIRST, FIRST_EACH = 8, 2
 #: How exactly equations are solved, as a part of the tolerance; within what Ipopt can do.
 EXACT = 1e-3
+#: Notes of rounds that cannot be compared with the one before, or with any.
+OTHERWISE, OVERLOOKED = 'modes in another order than before', 'a switch is overlooked between two stage points'
 NOT_REACHED = (
     "refine: the tolerance %.1e is not reached in %d rounds; the estimated error is %.1e. Take more rounds (max_rounds), "
     "more points (ncp), or more elements in the first round (nfe)."
@@ -109,7 +113,7 @@ class _Refining:
             with attempt(self._model, self._wrt) as now:
                 started = time.perf_counter()
                 failure = self._solver.solve(numbers, self._best)
-                row, following = self._fail(numbers, failure) if failure is not None else self._judge(numbers)
+                row, following = self._judge(numbers) if failure is None else self._fail(numbers, 'no solution: ' + failure.cause)
                 self._table.add(row | {'seconds': time.perf_counter() - started})
                 reached = failure is None and self._error <= self._tolerance
                 last = reached or len(self._table) == max_rounds or following == numbers
@@ -122,22 +126,24 @@ class _Refining:
             logger.warning(NOT_REACHED, self._tolerance, len(self._table), self._error)
         return Refinement(reached, self._error, self._table.frame, self._solver.results)
 
-    def _fail(self, numbers, failure):
-        """A row of the table, and the next numbers of elements."""
+    def _fail(self, numbers, note):
+        """A row of the table, and the next numbers of elements, after a round that tells nothing."""
         self._rounds = []
-        row = {'nfe': numbers, 'elements': sum(numbers), 'note': 'no solution: ' + failure.cause}
+        row = {'nfe': numbers, 'elements': sum(numbers), 'note': note}
         return row, [min(2 * n, most) for n, most in zip(numbers, self._most)]
 
     def _judge(self, numbers):
         """The same for a round with a solution."""
-        self._best = Round(numbers, read_solution(self._model, self._wrt, self._quantities))
+        self._best, self._error = Round(numbers, read_solution(self._model, self._wrt, self._quantities)), nan
+        if any(True for _ in excursions(self._model, self._wrt, switching_functions(self._model, self._wrt))):
+            return self._fail(numbers, OVERLOOKED)
         lost = bool(self._rounds) and not comparable(self._rounds[-1], self._best)
         self._rounds = [self._best] if lost else [*self._rounds, self._best]
         found = judge(self._rounds, self._solver.order, self._tolerance, self._most)
         self._error = float(found.error.largest)
         row = {'nfe': numbers, 'elements': sum(numbers), 'order': found.order, 'pairs': self._best.solution.pairs}
         row |= {name: getattr(found.error, name) for name in ERRORS}
-        return row | {'note': 'modes in another order than before' if lost else ''}, found.following
+        return row | {'note': OTHERWISE if lost else ''}, found.following
 
     def _return_to_best(self, failure):
         """The last round had no solution: the last one that had one is solved again."""

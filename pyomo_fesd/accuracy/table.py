@@ -73,9 +73,5 @@ class Table:
 
 def lines(table):
     """As text."""
-    formatters = {name: _formatter(FORMATS.get(name, '{:.1e}')) for name in (*ERRORS, *FORMATS)}
-    return table.to_string(formatters=formatters, max_colwidth=NOTE)
-
-
-def _formatter(pattern):
-    return lambda number: '-' if pd.isna(number) else pattern.format(number)
+    formatters = {name: FORMATS.get(name, '{:.1e}').format for name in (*ERRORS, *FORMATS)}
+    return table.to_string(formatters=formatters, na_rep='-', max_colwidth=NOTE)

@@ -127,7 +127,8 @@ class Reader:
 
     def _refuse_foreign(self, tree, modes, split, parts=None):
         """Refuse variables of another model; ``parts`` are all that there are, if they are known."""
-        homes = parts and ComponentSet(part.parent_component() for part in parts)
+        # units of measure are among the parts, and belong to no model
+        homes = parts and ComponentSet(part.parent_component() for part in parts if hasattr(part, 'parent_component'))
         if homes and all(home in self._own for home in homes):
             return
         for mode, constraints in zip(modes, split):

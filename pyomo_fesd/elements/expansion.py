@@ -23,7 +23,6 @@ from pyomo.core import (
     Set,
     SOSConstraint,
     Suffix,
-    TransformationFactory,
     Var,
 )
 from pyomo.core.base.misc import apply_indexed_rule
@@ -31,6 +30,7 @@ from pyomo.dae import ContinuousSet, DerivativeVar, Integral
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
+from pyomo_fesd.elements.collocation import Collocation
 from pyomo_fesd.elements.restore import restored_on_error
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.marks import REPLACED, is_generated, marked
@@ -75,7 +75,7 @@ def discretise(block, wrt, shares, ncp, scheme, held=()):
         place_boundaries(wrt, shares)
         try:
             with hybrid_expansion(block, wrt):
-                TransformationFactory('dae.collocation').apply_to(block, wrt=wrt, nfe=sum(shares), ncp=ncp, scheme=scheme)
+                Collocation().apply_to(block, wrt=wrt, nfe=sum(shares), ncp=ncp, scheme=scheme)
             _ask_missing_constraints(block, wrt)
         except KeyError as error:
             raise FesdError(

@@ -189,8 +189,9 @@ class Reader:
     def first(self, label):
         """The algebraic equations of the first time; conditions hold there as they are."""
         conditions = [c for c in self._conditions[label] if c.active]
-        pairs = [read(c) for c in conditions]
-        return self._problem(self._equations[label], {}, pairs, {}, conditions, (label,))
+        pairs, families = [read(c) for c in conditions], families_of(self._block)
+        points = {f.name: Points([f.sides[label]], 1, f.continuous) for f in families if label in f.sides}
+        return self._problem(self._equations[label], {}, pairs, points, conditions, (label,))
 
     def element(self, element, limits):
         """What holds in an element.

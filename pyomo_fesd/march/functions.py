@@ -1,4 +1,4 @@
-"""One kind of element as compiled functions: what must vanish, and what must not become negative.
+"""One kind of element, or the first time, as compiled functions: what must vanish, and what must not become negative.
 
     equations = 0;      sides G, H of every condition and limits, at every label;      signs of all else that is generated
 
@@ -50,7 +50,7 @@ class Functions:
         sides that are continuous in time
     lower, upper : arrays
         bounds of w
-    length : int
+    length : int or None
         place of the length multiplier in w
     """
 
@@ -61,9 +61,10 @@ class Functions:
         known = list(scene.model.known.values())
         self._c = c = compile_problem(read_problem(scene.model), timer, parameters=known, user_scaling=user_scaling)
         self._places = np.array([v.index() for v in c.variables], dtype=int)
-        self.length = next(j for j, v in enumerate(c.variables) if v is scene.length)
+        self.length = next((j for j, v in enumerate(c.variables) if v is scene.length), None)
         self.lower, self.upper = c.lbx.copy(), c.ubx.copy()
-        self.lower[self.length], self.upper[self.length] = -np.inf, np.inf
+        if self.length is not None:
+            self.lower[self.length], self.upper[self.length] = -np.inf, np.inf
         self.names = list(there)
         self.complete = self._is_complete(pattern, there)
         if self.complete:
@@ -72,7 +73,7 @@ class Functions:
     def _is_complete(self, pattern, there):
         stands = sum(len(points.pairs) for points in there.values())
         return (
-            self._c.scale.x[self.length] == 1.0
+            (self.length is None or self._c.scale.x[self.length] == 1.0)
             and all(points.labels == len(pattern.labels) for points in there.values())
             and stands == sum(1 for name, _ in self._conditions if name == 'point')
         )

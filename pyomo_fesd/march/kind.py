@@ -135,6 +135,28 @@ class Kind:
         return h, State(dict(zip(self._smooth.names, active.tolist())))
 
 
+def find_first(equations, sides, options, timer):
+    """Find the values of the first time by Newton's method; False if their active set is not clear.
+
+    Parameters
+    ----------
+    equations : Equations
+    sides : dict name -> Pair
+        the conditions there
+    """
+    with phase(timer, 'compile'):
+        functions = Functions(equations, timer, options.get('user_scaling', True))
+    if not functions.complete:
+        return False
+    functions.know(known_values(equations))
+    smooth, before = Smooth(functions, (1.0,)), [v.value for v in equations.unknown]
+    start = functions.point(before)
+    step = smooth.step(start, smooth.guess(start), None, smooth.nothing)
+    if step is not None:
+        put_out(equations, functions.values(step.w, before))
+    return step is not None and active_at_first(sides) is not None
+
+
 def active_at_first(sides):
     """The active set of the first time; None where a condition has two sides that are zero.
 

@@ -21,7 +21,7 @@ from pyomo_fesd.march.accumulation import accumulation
 from pyomo_fesd.march.equations import Reader, own_labels, variables_of
 from pyomo_fesd.march.events import Jumps, Memory
 from pyomo_fesd.march.freedom import refuse_free_start, refuse_freedom
-from pyomo_fesd.march.kind import Kind, State, active_at_first
+from pyomo_fesd.march.kind import Kind, State, active_at_first, find_first
 from pyomo_fesd.march.prescribed import prescribed_states
 from pyomo_fesd.march.residuals import largest_residuals
 from pyomo_fesd.march.shares import Even, Passed, equal_lengths, wanted
@@ -39,7 +39,7 @@ NO_STEP = 1e-9
 #: A step that is shorter than its share by more than this has been cut short by an event.
 CUT = 1e-7
 #: Lengths between two switches are equal if they differ by less than this part; what is left after so many marches may be larger.
-EQUAL, NEARLY, PASSES = 1e-11, 1e-7, 6
+EQUAL, NEARLY, PASSES = 1e-10, 1e-7, 6
 #: How an element is tried, one after the other: from where the last one ended; from afar; with other starts.  A step of no
 #: length is a local solution of its own where a switch lies on the left boundary, so the later ones look farther.
 TRIES = (
@@ -131,7 +131,7 @@ class March:
         equations = self._reader.first(first)
         states = [d.get_state_var() for d in derivatives(self._model, self._wrt)]
         refuse_free_start(equations, [v for x in states for v in x.values() if self._times.time(v) == first and not v.fixed])
-        if equations.unknown:
+        if equations.unknown and not find_first(equations, self._reader.sides(first), self._options, self._timer):
             with phase(self._timer, 'compile'):
                 window = Window(equations, self._options)
             with phase(self._timer, 'window'):
@@ -221,12 +221,17 @@ class March:
             answer, h = kind.window_step(equations, most, options)
             if answer.stationarity == 'B' and h > least:
                 return kind.take_window(equations, most, h)
-        self._require(answer, equations, kind.window)
         kind.window.force(equations, most / kind.nominal)
         missed = largest_residuals(self._model, self._times, equations, kind.window.values)
+        forced = f"; where one is forced, {missed}" if missed else ''
+        if answer.stationarity == 'B':
+            raise self._stuck(
+                f"no step is possible from time {self._time:.6g}{forced}",
+                "look for a bound that the solution reaches there, or for a state from which no mode leads on",
+            )
         raise self._stuck(
-            f"no step is possible from time {self._time:.6g}" + (f"; where one is forced, {missed}" if missed else ''),
-            "look for a bound that the solution reaches there, or for a state from which no mode leads on",
+            f"no step was found from time {self._time:.6g}: {answer.outcome}{forced}",
+            "check the equations there; more elements help where the solution is steep",
         )
 
     def _problem(self, element):
@@ -257,7 +262,7 @@ class March:
             missed = largest_residuals(self._model, self._times, equations, window.values)
             raise self._stuck(
                 f"no solution at time {self._time:.6g}: {missed or answer.reason or answer.outcome}",
-                "check the equations there; more elements help where the solution is steep",
+                "check the equations there, and the initial values",
             )
 
     def _stuck(self, cause, fix):

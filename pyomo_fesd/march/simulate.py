@@ -11,6 +11,7 @@ Does not apply: to systems with freedom; inputs have to be given.
 from pyomo.common.collections import ComponentMap
 from pyomo.common.gc_manager import PauseGC
 from pyomo.common.timing import HierarchicalTimer
+from pyomo.contrib.solver.common.factory import SolverFactory
 
 from pyomo_fesd.errors import FesdError
 from pyomo_fesd.indicators import set_indicators
@@ -52,6 +53,7 @@ def simulate(model, wrt=None, inputs=(), timer=None, **options):
     if wrt not in records(model).grids:
         raise FesdError(wrt, "simulate: its elements are not movable", "apply fesd.finite_elements first")
     inputs = list(inputs) if isinstance(inputs, (list, tuple)) else [inputs]
+    SolverFactory('mpec_hybrid', **options)  # refuses unknown options before anything is solved
     solve_timeless(model, wrt)
     ends = _fixed_later(model, wrt)
     timer = timer or HierarchicalTimer()

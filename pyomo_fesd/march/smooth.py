@@ -19,7 +19,7 @@ exactly one active set is consistent.  Then it is None, and the window decides.
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
@@ -97,6 +97,12 @@ class Smooth:
         G, H = self._sums(values)
         return G >= H
 
+    def guess(self, w):
+        """An active set by the continuous sides only: the multipliers at ``w`` are a first guess."""
+        V, _ = self._f.at(w)
+        sides = V[self._f.signed][: 2 * len(self.names)].sum(axis=1)
+        return sides[1::2] <= ABSOLUTE
+
     def _sums(self, values):
         """The sums of both sides of every condition over the stages."""
         return values[: 2 * len(self.names), : self._stages.size].sum(axis=1).reshape(-1, 2).T
@@ -137,7 +143,8 @@ class Smooth:
     def _try(self, w, active, most, left):
         """The element with one active set, or None; and functions that are negative from its beginning."""
         start = w.copy()
-        start[self._f.length] = most
+        if self._f.length is not None:
+            start[self._f.length] = most
         found = self._system(active).solve(start)
         if found is None:
             return None, []
@@ -154,7 +161,8 @@ class Smooth:
             return []
         first = _flipped(active, wrong)
         choices = [(None, *(i for i in self._siblings[k // 2] if 2 * i not in wrong and 2 * i + 1 not in wrong)) for k in wrong]
-        return [_flipped(first, [2 * i + 1 - first[i] for i in more if i is not None]) for more in product(*choices)]
+        some = islice(product(*choices), TRIED)
+        return [_flipped(first, [2 * i + 1 - first[i] for i in more if i is not None]) for more in some]
 
     @cached_property
     def _siblings(self):
@@ -172,7 +180,7 @@ class Smooth:
             starts = f.starts[zero]
             vanishing = np.concatenate([f.vanishing, *held, starts[starts >= 0]])
             columns = np.arange(f.lower.size)
-            if event is None:
+            if event is None and f.length is not None:
                 columns = np.delete(columns, f.length)
             self._systems[key] = System(f, vanishing, columns, None if event is None else self._arrival(event))
         return self._systems[key]

@@ -11,6 +11,7 @@ import numpy as np
 from pyomo_fesd.mpcc.active_set import ActiveSets, active_sets
 from pyomo_fesd.mpcc.nlp import NlpResult
 from pyomo_fesd.mpcc.recovery import LADDER
+from pyomo_fesd.mpcc.stationarity import Stationarity
 
 #: For each path the form of its first relaxation and that of the others, without an objective and with one.  The elastic form is by
 #: far the quickest; Scholtes' at the first eps puts every pair in the middle, whatever the size of the objective.  The next path
@@ -102,6 +103,8 @@ class Homotopy:
         self._after(self.run)
         if not self._ladder or self._certified():
             return None
+        if self._fails_at_once(stage):
+            return self._begin(stage.path + 1, "start again, other form", relaxed)
         step, options = self._ladder.pop(0), self._options
         self._steps.note(step.what, relaxed.w)
         self._gap.restart()
@@ -109,6 +112,11 @@ class Homotopy:
             self._branches.forget()
         eps = max(step.eps(options.eps_init, stage.eps, options.eps_factor), options.eps_final)
         return _Stage((stage.path + step.other_form) % len(self._paths), step.start(self._start, relaxed.w, self), eps)
+
+    def _fails_at_once(self, stage):
+        """Whether a path ends where it begins: there is nothing to go back to, and the forms differ most at their first eps."""
+        first = stage.before is None and len(self._ladder) == len(LADDER)
+        return first and self._branches is not None and stage.path + 1 < len(self._paths)
 
     def _next(self, stage, relaxed):
         """Explore what the relaxation shows; the stage after it, or None."""
@@ -143,18 +151,25 @@ class Homotopy:
         return None not in (before, now) and max(before, now) - best <= same
 
     def _other_form(self, stage, relaxed):
-        """Where a path ends with nothing certified: the same with shorter elements if nothing is feasible, then the next path."""
+        """Where a path ends with nothing certified: the same with shorter elements if they may be missing, then the next path."""
         if self._branches is None or self._certified():
             return None
-        wider = self.run.point is None and self._c.widen()
+        wider = self._short_of_lengths() and self._c.widen()
         path = stage.path + (not wider)
         if path == len(self._paths):
             return None
-        found = "feasible" if wider else "certified"
-        self._steps.note(f"nothing {found} on this path, " + ("shorter elements" if wider else "other form"), relaxed.w)
+        return self._begin(path, "nothing certified on this path, " + ("shorter elements" if wider else "other form"), relaxed)
+
+    def _begin(self, path, why, relaxed):
+        """The first stage of another path."""
+        self._steps.note(why, relaxed.w)
         self._gap.restart()
         self._branches.forget()
         return _Stage(path, self._start, self._options.eps_init)
+
+    def _short_of_lengths(self):
+        """Whether there is nothing feasible, or what only a bound of the method keeps from descending."""
+        return self.run.point is None or self.run.point.certificate.grade is Stationarity.LIMITED
 
     def _certified(self):
         return self.run.point is not None and self.run.point.certificate.certified

@@ -9,6 +9,7 @@ from pyomo_fesd.units.pump import pump
 from pyomo_fesd.units.relay import relay
 from pyomo_fesd.units.relief_valve import relief_valve
 from pyomo_fesd.units.saturation import saturation
+from pyomo_fesd.units.scaling import scale_by_values
 from pyomo_fesd.units.split_range import split_range
 from pyomo_fesd.units.vle import vle
 from pyomo_fesd.units.weir import weir
@@ -20,6 +21,7 @@ __all__ = [
     'relay',
     'relief_valve',
     'saturation',
+    'scale_by_values',
     'split_range',
     'vle',
     'weir',

@@ -49,11 +49,12 @@ def _at(given, block, index, name):
     if not getattr(given, 'is_indexed', bool)():
         return given
     key = index if len(index) != 1 else index[0]
-    if key not in given:
+    try:
+        return given[key]  # not 'key in given': while pyomo.dae expands a model, data come into being when they are asked for
+    except KeyError as error:
         raise FesdError(
             block, f"{name}: '{given.name}' has no index {key}", "give a component over the same sets, or a function of them"
-        )
-    return given[key]
+        ) from error
 
 
 def variable(given, block, name):
@@ -72,7 +73,7 @@ def variable(given, block, name):
 def like(number, quantity):
     """A bare number with the unit of ``quantity``; everything else as it is."""
     unit = None if number.__class__ not in native_numeric_types else units.get_units(quantity)
-    return number if unit is None or not number else number * unit
+    return number if unit in (None, units.dimensionless) or not number else number * unit
 
 
 def refuse_order(block, low, high, names):

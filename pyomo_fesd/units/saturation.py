@@ -1,7 +1,9 @@
 """An actuator that saturates: v = mid(low, u, high), one pair for each limit (theory, eq. 8).
 
     one limit     0 <= v - low  perp  v - u >= 0
-    two limits    0 <= s  perp  s - (u - low) >= 0,     0 <= high - v  perp  low + s - v >= 0         v = min(high, low + s)
+    two limits    0 <= s  perp  s - (u - low)/R >= 0,   0 <= (high - v)/R  perp  s - (v - low)/R >= 0,   R = high - low
+
+With two limits s = max(0, u - low)/R and v = min(high, low + R s); everything is measured by the range R, in whatever unit v is.
 
 Takes: the command u and the output v, a variable.
 Leaves: ``lower`` and ``upper``, and with two limits the variable ``s``; no equation.
@@ -9,7 +11,6 @@ Does not apply: to limits that cross.
 """
 
 from pyomo.core import Var
-from pyomo.environ import units
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import marks
@@ -51,23 +52,24 @@ def saturation(*sets, command, output, low=None, high=None):
 
 def _build(block, command, output, low, high):
     output = variable(output, block, 'output')
-    reached = command
-    if low is not None and high is not None:
-        reached = _lift(block, command, like(low, output))
-    elif low is not None:
-        low = like(low, output)
-        block.lower = Complementarity(expr=complements(output >= low, command - output <= 0))
-        marks.mark(block, marks.CONTINUOUS, output, block.lower)
-    if high is not None:
-        high = like(high, output)
-        block.upper = Complementarity(expr=complements(output <= high, output - reached <= 0))
-        marks.mark(block, marks.CONTINUOUS, output, block.upper)
+    if low is None:
+        _limit(block, 'upper', output, like(high, output) - output, command - output)
+    elif high is None:
+        _limit(block, 'lower', output, output - like(low, output), output - command)
+    else:
+        _limits(block, command, output, like(low, output), like(high, output))
 
 
-def _lift(block, command, low):
-    """max(low, command) as low + s."""
-    z = command - low
-    block.s = Var(bounds=(0, None), initialize=max(0.0, finite(z)), units=units.get_units(z))
-    block.lower = Complementarity(expr=complements(block.s >= 0, z - block.s <= 0))
-    marks.mark(block, marks.CONTINUOUS, block.s, block.lower)
-    return low + block.s
+def _limit(block, name, variable, distance, excess):
+    """0 <= distance perp excess >= 0, which makes ``variable`` as continuous as the command."""
+    pair = Complementarity(expr=complements(distance >= 0, excess >= 0))
+    block.add_component(name, pair)
+    marks.mark(block, marks.CONTINUOUS, variable, pair)
+
+
+def _limits(block, command, output, low, high):
+    span = high - low
+    above = (command - low) / span
+    block.s = Var(bounds=(0, None), initialize=max(0.0, finite(above)))
+    _limit(block, 'lower', block.s, block.s, block.s - above)
+    _limit(block, 'upper', output, (high - output) / span, block.s - (output - low) / span)

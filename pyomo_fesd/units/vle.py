@@ -3,8 +3,8 @@
     0 <= v <= 1  perp  sum_i (x_i - y_i),       x_i = z_i/(1 + v (K_i - 1)),   y_i = K_i x_i
 
 v is the vapour fraction of a mixture z.  All liquid (v = 0): the vapour that would be in equilibrium does not add up,
-sum y < sum x; between, both add up to 1 (Rachford and Rice); all vapour (v = 1) would need more liquid than there is.  No bubble and no dew
-point are needed.
+sum y < sum x; between, both add up to 1 (Rachford and Rice); all vapour (v = 1) would need more liquid than there is.  No bubble
+and no dew point are needed.
 
 Takes: the vapour fraction, a variable; overall composition and K-values, K_i = p_i(T)/P for Raoult's law.
 Leaves: ``x`` and ``y`` as Expressions over the components, and ``pair``, a mixed Complementarity.  v is marked as continuous where

@@ -32,7 +32,7 @@ def test_without_any_guess_the_march_finds_the_overflow_and_the_full_problem_sta
     table = pyomo_fesd.simulate(m, m.fs.time)
     assert table[idaes_overflow.OUTFLOW].max() == pytest.approx(idaes_overflow.INFLOW, rel=1e-9)
     results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=True)
-    assert results.solver.stationarity == 'B' and results.solver.nlps <= 2
+    assert results.solver.stationarity == 'B' and 'relaxation' not in str(results.solver.steps)
     (switch,) = pyomo_fesd.switches(m, m.fs.time)
     assert switch.time == pytest.approx(idaes_overflow.OVERFLOW_TIME, abs=1e-6)
 
@@ -75,5 +75,5 @@ def test_a_failed_element_names_the_unit():
     m = moving(idaes_overflow.plant(), 8)
     idaes_overflow.specify(m)
     m.fs.cstr.outlet.flow_vol.fix(idaes_overflow.INFLOW + 4e-3)
-    with pytest.raises(pyomo_fesd.FesdError, match=r'from time 150; where one is forced, largest residuals in fs\.'):
+    with pytest.raises(pyomo_fesd.FesdError, match=r'(?s)from time 150.*where one is forced, largest residuals in fs'):
         pyomo_fesd.simulate(m, m.fs.time, max_iterations=100)

@@ -134,7 +134,7 @@ def test_relaxation_mode_raises_in_the_new_interface_as_any_uncertified_point_do
 
 
 def test_a_coarse_last_eps_leaves_a_point_that_is_called_infeasible_with_its_residual():
-    results = run(small_mpccs.toy(0.5, 0.2)[0], mode='relaxation', eps_final=1e-2)
+    results = run(small_mpccs.toy(0.5, 0.2)[0], relaxation='scholtes', mode='relaxation', eps_final=1e-2)
     assert results.extra_info.outcome == RELAXED
     assert results.solution_status is SolutionStatus.infeasible
     assert 1e-4 < results.extra_info.complementarity < 1e-1
@@ -148,7 +148,7 @@ def test_multipliers_of_a_relaxation_can_be_loaded_also_with_a_slack(form):
 
 
 def test_a_limit_in_relaxation_mode_leaves_the_last_relaxation_and_not_the_first():
-    results = run(small_mpccs.bard1()[0], mode='relaxation', max_iterations=30)
+    results = run(small_mpccs.bard1()[0], relaxation='scholtes', mode='relaxation', max_iterations=30)
     assert results.termination_condition is TerminationCondition.iterationLimit
     assert results.incumbent_objective == pytest.approx(relaxations(results)[-1].f)
     assert results.extra_info.complementarity < 1e-4

@@ -83,12 +83,19 @@ def test_a_level_in_blocks_given_as_a_reference():
     assert m.V[END].value == pytest.approx(END_WITH_LAW, abs=5e-6)
 
 
+def elsewhere():
+    """A level that is not over time."""
+    level = pyo.Param([7], initialize=1)
+    level.construct()
+    return level
+
+
 @pytest.mark.parametrize(
     'given, said',
     [
         (dict(flow=lambda m, t: 2 * m.F[t]), 'is no variable'),
         (dict(resistance=1, discharge=1), 'both a resistance and a discharge'),
-        (dict(level=pyo.Param([7], initialize=1, name='L')), 'has no index'),
+        (dict(level=elsewhere()), 'has no index'),
     ],
 )
 def test_refused(given, said):
