@@ -173,14 +173,14 @@ def test_iteration_limit_is_told():
 
 def test_ctrl_c_during_an_nlp_ends_with_a_result(monkeypatch):
     m = big_oscillator()
-    names, iterations, ask = set(m.component_map()), itertools.count(), nlp_casadi._Watch.eval
+    names, iterations, ask = set(m.component_map()), itertools.count(), nlp_casadi._Watch.eval_buffer
 
-    def press(watch, arg):
+    def press(watch, *buffers):
         if next(iterations) == 3:
             os.kill(os.getpid(), signal.SIGINT)
-        return ask(watch, arg)
+        return ask(watch, *buffers)
 
-    monkeypatch.setattr(nlp_casadi._Watch, 'eval', press)
+    monkeypatch.setattr(nlp_casadi._Watch, 'eval_buffer', press)
     results = pyo.SolverFactory('mpec_hybrid').solve(m)
     assert results.solver.termination_condition == pyo.TerminationCondition.resourceInterrupt
     assert set(m.component_map()) == names

@@ -64,7 +64,6 @@ def test_methods_that_find_switches_are_precise(problem, method):
     assert row['error'] < PRECISE[method]
 
 
-@pytest.mark.xfail(reason="since the relaxations after the first are elastic, the switch stays on a stage boundary", strict=False)
 def test_the_control_of_the_tank_is_found_on_a_coarse_grid():
     assert quick('tank control', OURS, K=2)['error'] < PRECISE[OURS]
 

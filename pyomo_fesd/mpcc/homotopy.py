@@ -152,7 +152,12 @@ class Homotopy:
 
     def _other_form(self, stage, relaxed):
         """Where a path ends with nothing certified: the same with shorter elements if they may be missing, then the next path."""
-        if self._branches is None or self._certified():
+        if self._branches is None:
+            return None
+        if self.run.point is not None and not self._certified():
+            # the least length may keep a switch from a boundary of a stage that a branch beside carries it over
+            self._branches.move()
+        if self._certified():
             return None
         wider = self._short_of_lengths() and self._c.widen()
         path = stage.path + (not wider)
