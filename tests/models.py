@@ -5,6 +5,7 @@ Rules ask their component for the model (``d.model()``), so that clones can be d
 
 import itertools
 import random
+import re
 
 import pyomo.environ as pyo
 from pyomo import dae
@@ -238,6 +239,16 @@ def finite_elements(m, nfe=2, ncp=2, **keywords):
 # Looking at a model
 
 
+#: A decimal number in the text of an expression.
+NUMBER = re.compile(r'\d+\.\d+(e[-+]?\d+)?')
+
+
+def _text(expr):
+    # the coefficients of pyomo.dae and of fesd.finite_elements differ in their last digits
+    rounded = NUMBER.sub(lambda number: f'{float(number[0]):.10g}', str(expr))
+    return re.sub(r'(?<![\d.])1\*', '', rounded)
+
+
 def snapshot(m):
     """Everything that a user can see of a model: names, active flags, values, what is fixed, expressions."""
     seen = {'points': list(m.t) if m.component('t') is not None else None}
@@ -248,7 +259,7 @@ def snapshot(m):
         if data.ctype in (pyo.Var, pyo.BooleanVar, dae.DerivativeVar):
             seen[data.name] = (data.value, data.fixed, data.stale)
         elif data.ctype is pyo.Constraint:
-            seen[data.name] = (data.active, str(data.expr))
+            seen[data.name] = (data.active, _text(data.expr))
     return seen
 
 

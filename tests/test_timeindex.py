@@ -188,9 +188,11 @@ def test_derivatives_are_found_in_blocks_and_disjuncts_and_after_discretisation(
     names = ['dx', 'dT', 'unit[a].dy']
     assert [d.name for d in derivatives(m, m.t)] == names
     assert [d.name for d in derivatives(m, m.z)] == ['dTz']
-    assert not discretised(m.t)
+    assert not discretised(m.z)
+    pyo.TransformationFactory('dae.finite_difference').apply_to(m, wrt=m.z, nfe=2)
+    assert discretised(m.z) and not discretised(m.t)
     move(m, 2, 1, wrt=m.t)
-    assert discretised(m.t) and not discretised(m.z)
+    assert discretised(m.t)
     assert [d.name for d in derivatives(m, m.t)] == names
 
 

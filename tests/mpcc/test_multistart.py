@@ -31,7 +31,7 @@ LOCAL, BEST = 14.6, 18.4
 
 def solve(model, **options):
     """With the reduced LPEC: the full one leads from bilin's first start to the optimum."""
-    return pyo.SolverFactory('mpec_hybrid').solve(model, **{'lpec': 'reduced'} | options)
+    return pyo.SolverFactory('mpec_hybrid').solve(model, **{'lpec': 'reduced', 'relaxation': 'scholtes'} | options)
 
 
 def without_time(starts):
