@@ -77,6 +77,8 @@ def draw(table):
     axis = figure.subplots()
     for phase in PHASES:
         axis.loglog(table['elements'], table[f'{phase} (s)'], 'o-', label=phase)
+    axis.set_xticks(table['elements'], table['elements'], minor=False)
+    axis.set_xticks([], minor=True)
     axis.set_xlabel('elements')
     axis.set_ylabel('time (s)')
     axis.legend()
