@@ -92,7 +92,7 @@ def test_with_jumps_each_side_has_its_own_line(points, doubled, jump, share):
     written = [q for (x, y), twice in zip(points, doubled) for q in ([(x, y), (x, y + jump)] if twice else [(x, y)])]
     x, y = zip(*written)
     where = x[0] + share * (x[-1] - x[0])
-    if where in x:
+    if where in x or where > x[-1]:  # round-off
         return
     k = next(k for k in range(len(x)) if x[k] < where < x[k + 1])
     found = evaluated(table(None, x, y), where)
@@ -283,7 +283,7 @@ def test_bounds_in_optimal_control():
     m.least = pyo.Piecewise(m.t, m.u, m.x, pw_pts=[0, 1, 10], f_rule=[0, 0.1, 5], pw_constr_type='LB', **rules)
     m.ode = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == m.u[t])
     m.goal = pyo.Objective(expr=m.x[1], sense=pyo.maximize)
-    run(m, 6, 3)
+    run(m, 6, 4)  # the optimum of the grid has one element on one side
     assert m.x[1].value == pytest.approx(1 + (exp(2 * (1 - log(2))) - 1) / 2, abs=1e-6)
     assert [s.time for s in pyomo_fesd.switches(m)] == pytest.approx([log(2)], abs=1e-6)
     assert all(b.active for b in m.least.values()) and not any(b.active for b in m.limit.values())
