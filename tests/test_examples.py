@@ -122,6 +122,8 @@ def test_flash_is_smaller_than_with_three_modes():
     small, large = (pyomo_fesd.report(flash.transform(build())) for build in (flash.build, flash.build_modes))
     assert [small[name] for name in ('variables', 'constraints', 'pairs')] == [511, 410, 42]
     assert [large[name] for name in ('variables', 'constraints', 'pairs')] == [716, 533, 84]
+
+
 def network_by_events(times):
     """The gene network integrated from event to event: starved gene 1, then protein 1 slides, then protein 2 too."""
     g = gene_network

@@ -93,9 +93,7 @@ def test_unknown_option_is_named():
 
 
 def test_options_reach_ipopt():
-    results = SolverFactoryV2('mpec_hybrid').solve(
-        toy(), nlp_options={'max_iter': 1}, raise_exception_on_nonoptimal_result=False
-    )
+    results = SolverFactoryV2('mpec_hybrid').solve(toy(), nlp_options={'max_iter': 1}, raise_exception_on_nonoptimal_result=False)
     assert max(step.iterations for step in results.extra_info.steps) <= 1
 
 

@@ -57,9 +57,7 @@ def tank_options(N, K, scheme, comp_tol):
     a dict shared by all instances, hence the copy. The homotopy stops at sigma_N,
     so that a tighter comp_tol is reached only with sigma_N lowered to it.
     """
-    options = NosnocOpts(
-        terminal_time=HORIZON, N_finite_elements=N, n_s=K, irk_scheme=SCHEMES[scheme], print_level=0
-    )
+    options = NosnocOpts(terminal_time=HORIZON, N_finite_elements=N, n_s=K, irk_scheme=SCHEMES[scheme], print_level=0)
     options.opts_casadi_nlp = deepcopy(NosnocOpts.opts_casadi_nlp)
     if comp_tol is not None:
         options.comp_tol = options.sigma_N = comp_tol

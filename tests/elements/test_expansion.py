@@ -429,9 +429,7 @@ def failing_disjunction(m):
 
 
 def failing_logic(m):
-    m.bad = pyo.LogicalConstraint(
-        m.t, rule=lambda m, t: pyo.atleast(fails(t), m.below[t].indicator_var, m.above[t].indicator_var)
-    )
+    m.bad = pyo.LogicalConstraint(m.t, rule=lambda m, t: pyo.atleast(fails(t), m.below[t].indicator_var, m.above[t].indicator_var))
 
 
 def failing_complementarity(m):

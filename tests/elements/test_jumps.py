@@ -247,9 +247,7 @@ def test_a_guard_with_a_held_control_is_refused():
     m = bouncing_ball.build()
     m.floor = pyo.Var(m.t, initialize=0)
     m.del_component(m.impact)
-    m.impact = pyomo_fesd.state_jump(
-        m.t, guard=lambda m, t: m.q[t] - m.floor[t], reset=lambda m, t: [(m.v[t], -m.v[t])]
-    )
+    m.impact = pyomo_fesd.state_jump(m.t, guard=lambda m, t: m.q[t] - m.floor[t], reset=lambda m, t: [(m.v[t], -m.v[t])])
     before = snapshot(m)
     with pytest.raises(FesdError, match=r"impact: its guard contains the control 'floor\[.*\]'"):
         move(m, 4, 2, piecewise_constant=[m.floor])

@@ -94,9 +94,7 @@ def as_model(data):
 
     m.f = pyo.Objective(expr=dot(data['cost']))
     m.rows = pyo.Constraint(range(2), rule=lambda m, i: dot(data['A'][i]) <= float(data['b'][i]))
-    m.c = Complementarity(
-        range(q), rule=lambda m, i: complements(m.w[i] >= 0, dot(data['M'][i]) + float(data['r'][i]) >= 0)
-    )
+    m.c = Complementarity(range(q), rule=lambda m, i: complements(m.w[i] >= 0, dot(data['M'][i]) + float(data['r'][i]) >= 0))
     return m
 
 
