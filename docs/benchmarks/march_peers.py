@@ -101,24 +101,21 @@ def thermostat_by_hand(method, tolerance, horizon):
 
 
 def cascade_by_hand(method, tolerance, S=20):
-    """A mode is the set of heads that are not full yet; what is full lets through what is too much."""
-    surplus = np.array([cascade._surplus(k, S) for k in range(S)])
+    """A mode is the set of heads that are not full yet; all other tanks overflow."""
+    feeds = cascade.feeds(S)
 
     def rhs(waiting):
+        overflows = np.array([0.0 if k in waiting else cascade.WEIR for k in range(S)])
+
         def field(t, x):
-            dx, above = np.zeros(S), 0.0
-            for k in range(S):
-                inflow = surplus[k] + cascade.LOSS + above - cascade.LOSS * x[k]
-                dx[k], above = (inflow, 0.0) if k in waiting else (0.0, inflow)
-            return dx
+            q = overflows * (x - 1)
+            return feeds - q + np.concatenate([[0.0], q[:-1]])
 
         return field
 
     def events(waiting):
         return [(lambda t, x, k=k: x[k] - 1, waiting - {k}) for k in waiting]
 
-    heads = frozenset(cascade.heads(S))
-    start = [1.0 - (cascade.DEFICIT if k in heads else 0.0) for k in range(S)]
-    switches, _ = integrate(start, cascade.HORIZON, heads, rhs, events, method, tolerance)
+    switches, _ = integrate(cascade.start(S), cascade.HORIZON, frozenset(cascade.heads(S)), rhs, events, method, tolerance)
     exact = [t for t in cascade.exact(S) if t < cascade.HORIZON]
     return max(np.abs(np.subtract(switches, exact))) if len(switches) == len(exact) else float('inf')
