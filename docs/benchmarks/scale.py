@@ -195,7 +195,7 @@ def draw(table, fits):
             axis.set_ylabel('time (s)')
             slopes = f': {letter}^{exponents["memory"].iloc[0]:.2f}' if len(exponents) else ''
             row[2].loglog(runs['size'], runs['MB at the end'] - runs['MB before'], 'o-', markersize=3, label=method + slopes)
-        row[2].set_title(f'{problem}, peak of memory above the imports')
+        row[2].set_title(f'{problem}, peak memory')
         row[2].set_ylabel('MB')
         for axis in row:
             axis.set_xlabel('elements N' if letter == 'N' else 'tanks S')
