@@ -63,7 +63,7 @@ def test_random_controls_are_the_same_for_both_methods():
 
 @pytest.mark.parametrize('problem', ['sliding', 'tank'])
 def test_the_twin_in_nosnoc_states_the_same_problem(problem):
-    pytest.importorskip('nosnoc')
+    pytest.importorskip('nosnoc', reason='the peer is no dependency: pip install nosnoc==0.2.0')
     p = import_module(f'ocp_{problem}')
     found, _ = ocp.with_nosnoc(p, None, 60)
     assert found['objective'] == pytest.approx(p.REFERENCE, rel=1e-3)
