@@ -1,16 +1,20 @@
-"""Batch reactor that is emptied to a heel and charged again whenever nine tenths of a charge are converted: a state jump.
+"""
+Batch reactor: four states jump at once
+=======================================
 
-A -> B with first-order kinetics while solvent evaporates at a constant rate:
+A -> B reacts with first-order kinetics while solvent evaporates at a constant rate.
+As soon as A has fallen to a tenth of a charge, the contents except for a heel go to
+the product tank, where P counts B, and a fresh charge comes in. Between two resets A
+is an exponential, so the exact times are known: the first batch takes
+log(A(0)/A_end)/k and every later one log(A+/A_end)/k with A+ = heel A_end + charge.
+::
 
     dA/dt = -k A,   dB/dt = k A,   dV/dt = -w
 
-As soon as A has fallen to a tenth of a charge, all but a heel of the contents goes to the product tank, with P the B in it, and a
-fresh charge comes in:
+    A+ = heel A + charge,              B+ = heel B,
+    V+ = heel V + volume of a charge,  P+ = P + (1 - heel) B
 
-    A+ = heel A + charge,   B+ = heel B,   V+ = heel V + volume of the charge,   P+ = P + (1 - heel) B
-
-Between two resets A is an exponential, so the first batch takes log(A(0)/A_end)/k and every later one log(A+/A_end)/k with
-A+ = heel A_end + charge.  Units: mol, L, h.
+Units: mol, L, h.
 """
 
 from math import log
@@ -30,23 +34,26 @@ PICTURE = 'batch_reactor.png'
 
 
 def resets(horizon=HORIZON):
-    """When the reactor is emptied, up to the horizon."""
+    """Exact times at which the reactor is emptied before the horizon."""
     first, later = log(CHARGE / A_END) / RATE, log(A_RESET / A_END) / RATE
     return [first + n * later for n in range(1 + int((horizon - first) / later))]
 
 
 def contents_at_resets(horizon=HORIZON):
-    """B, V and P just before each reset, and P after the last one."""
+    """Exact B, V and P just before each reset, and P after the last one."""
     B, V, P, before, found = 0.0, VOLUME, 0.0, 0.0, []
     for n, time in enumerate(resets(horizon)):
-        B, V = B + (CHARGE if n == 0 else A_RESET) - A_END, V - EVAPORATION * (time - before)
+        B, V = (
+            B + (CHARGE if n == 0 else A_RESET) - A_END,
+            V - EVAPORATION * (time - before),
+        )
         found.append((B, V, P))
         B, V, P, before = HEEL * B, HEEL * V + VOLUME, P + (1 - HEEL) * B, time
     return found, P
 
 
 def build(horizon=HORIZON):
-    """Kinetics, evaporation and the law of reset."""
+    """Build kinetics, evaporation and the law of reset."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, horizon))
     start = {'A': CHARGE, 'B': 0.0, 'V': VOLUME, 'P': 0.0}
@@ -67,21 +74,34 @@ def build(horizon=HORIZON):
             (m.P[t], m.P[t] + (1 - HEEL) * m.B[t]),
         ]
 
-    m.charging = pyomo_fesd.state_jump(m.t, guard=lambda m, t: m.A[t] - A_END, reset=after)
+    m.charging = pyomo_fesd.state_jump(
+        m.t, guard=lambda m, t: m.A[t] - A_END, reset=after
+    )
     return m
 
 
 def main():
-    """March through the elements, solve all of them at once from there, compare with the closed form, draw."""
+    """Simulate, solve all elements at once, compare with the exact times, draw."""
     m = build()
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=16, ncp=4)
     pyomo_fesd.simulate(m)
     results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=True)
     print(f'mpec_hybrid: {results.solver.reason}; {results.solver.nlps} NLPs.')
     for switch, exact in zip(pyomo_fesd.switches(m), resets()):
-        print(f'The reactor is emptied after {switch.time:.8f} h, {switch.time - exact:+.1e} h off.')
-    print(f'Product: {m.P[HORIZON].value:.6f} mol, {m.P[HORIZON].value - contents_at_resets()[1]:+.1e} mol off.')
-    units = {'A': 'A (mol)', 'B': 'B (mol)', 'V': 'volume V (L)', 'P': 'product P (mol)'}
+        print(
+            f'The reactor is emptied after {switch.time:.8f} h, '
+            f'{switch.time - exact:+.1e} h off.'
+        )
+    print(
+        f'Product: {m.P[HORIZON].value:.6f} mol, '
+        f'{m.P[HORIZON].value - contents_at_resets()[1]:+.1e} mol off.'
+    )
+    units = {
+        'A': 'A (mol)',
+        'B': 'B (mol)',
+        'V': 'volume V (L)',
+        'P': 'product P (mol)',
+    }
     pyomo_fesd.plot(m, m.t, ['A', 'B', 'V', 'P'], units=units).savefig(PICTURE, dpi=150)
     print(f'Contents of reactor and product tank over time: {PICTURE}')
 

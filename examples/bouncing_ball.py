@@ -1,9 +1,14 @@
-"""Bouncing ball: a state jump.  Where the height q falls to zero the velocity v is reversed, v(t+) = -e v(t-).
+"""
+Bouncing ball: a state jump
+===========================
+
+Where the height q falls to zero the velocity v is reversed: v(t+) = -e v(t-). The
+impact times have a closed form. With e = 1 all arcs are equal: the ball hits the
+ground at t_1 = sqrt(2 q(0)/g) = 0.404 s and then every 2 t_1. With e < 1 the arcs
+shrink by the factor e: n impacts take t_1 (1 + 2 e + ... + 2 e^(n-1)), and infinitely
+many take t_1 (1 + e)/(1 - e). ::
 
     dq/dt = v,   dv/dt = -g,   q(0) = 0.8 m,   v(0) = 0
-
-With e = 1 every arc is the same: the ball is on the ground at t_1 = sqrt(2 q(0)/g) = 0.404 s and then every 2 t_1.  With e < 1
-the arcs shrink by the factor e: n impacts take t_1 (1 + 2 e + ... + 2 e^(n-1)), and all of them t_1 (1 + e)/(1 - e).
 
 Units: m, s.
 """
@@ -22,20 +27,20 @@ PICTURE = 'bouncing_ball.png'
 
 
 def impacts(e=1.0, horizon=HORIZON):
-    """Times of the impacts up to the horizon."""
+    """Exact times of the impacts before the horizon."""
     times = (FIRST * (1 + 2 * sum(e**k for k in range(1, n))) for n in count(1))
     return list(takewhile(lambda t: t < horizon, times))
 
 
 def end(e=1.0, horizon=HORIZON):
-    """Height and velocity at the horizon."""
+    """Exact height and velocity at the horizon."""
     times = impacts(e, horizon)
     since, v = horizon - times[-1], e ** len(times) * GRAVITY * FIRST
     return v * since - GRAVITY * since**2 / 2, v - GRAVITY * since
 
 
 def build(e=1.0, horizon=HORIZON):
-    """The ball in free fall, and the law of impact."""
+    """Build the free fall and the law of impact."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, horizon))
     m.q, m.v = pyo.Var(m.t, initialize=HEIGHT), pyo.Var(m.t, initialize=0)
@@ -44,12 +49,14 @@ def build(e=1.0, horizon=HORIZON):
     m.v[0].fix(0)
     m.kinematics = pyo.Constraint(m.t, rule=lambda m, t: m.dq[t] == m.v[t])
     m.fall = pyo.Constraint(m.t, rule=lambda m, t: m.dv[t] == -GRAVITY)
-    m.impact = pyomo_fesd.state_jump(m.t, guard=lambda m, t: m.q[t], reset=lambda m, t: [(m.v[t], -e * m.v[t])])
+    m.impact = pyomo_fesd.state_jump(
+        m.t, guard=lambda m, t: m.q[t], reset=lambda m, t: [(m.v[t], -e * m.v[t])]
+    )
     return m
 
 
 def main():
-    """March through the elements, solve all of them at once from there, compare with the closed form, draw."""
+    """Simulate, solve all elements at once, compare with the exact times, draw."""
     m = build()
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=24, ncp=2)
     pyomo_fesd.simulate(m)
@@ -58,8 +65,13 @@ def main():
     for switch, exact in zip(pyomo_fesd.switches(m), impacts()):
         print(f'{switch}, {switch.time - exact:+.1e} s off')
     q, v = end()
-    print(f'q(3 s) = {m.q[HORIZON].value:.10f} m, {m.q[HORIZON].value - q:+.1e} m off; v is {m.v[HORIZON].value - v:+.1e} m/s off.')
-    pyomo_fesd.plot(m, m.t, ['q', 'v'], units={'q': 'height q (m)', 'v': 'velocity v (m/s)'}).savefig(PICTURE, dpi=150)
+    print(
+        f'q(3 s) = {m.q[HORIZON].value:.10f} m, {m.q[HORIZON].value - q:+.1e} m off; v '
+        f'is {m.v[HORIZON].value - v:+.1e} m/s off.'
+    )
+    pyomo_fesd.plot(
+        m, m.t, ['q', 'v'], units={'q': 'height q (m)', 'v': 'velocity v (m/s)'}
+    ).savefig(PICTURE, dpi=150)
     print(f'Height and velocity over time: {PICTURE}')
 
 

@@ -1,13 +1,21 @@
-"""A benzene/toluene mixture is heated until it boils and until it is dry: phases appear and disappear.
+"""
+Flash: phases that appear and disappear
+=======================================
 
-    dH/dt = Q,   H = (1 - v) cpL (T - T0) + v (latent + cpL (T_b - T0) + cpV (T - T_b))
-    0 <= v <= 1  perp  sum_i (x_i - y_i),      y_i = K_i x_i,   x_i (1 + v (K_i - 1)) = z_i,   K_i = p_i(T)/P
+A benzene/toluene mixture is heated until it boils and until it is dry. One mixed
+complementarity on the vapour fraction v describes all three cases: while everything
+is liquid (v = 0) the vapour in equilibrium with it would not add up, sum y < sum x;
+in between both sum up to 1 (Rachford and Rice); a vapour without liquid (v = 1) would
+need sum x < 1. The model lists no modes and needs neither bubble nor dew point. Since
+the latent heat is counted at the bubble point T_b of the feed, both exact times
+follow from the bubble and the dew point. ::
 
-H is the enthalpy of 1 kmol, v its vapour fraction.  While it is all liquid (v = 0) the vapour that would be in equilibrium with it
-does not add up, sum y < sum x; between, both add up to 1 (Rachford and Rice); all vapour (v = 1) would need more liquid than
-there is.  One mixed complementarity says so at every time: no modes to list, no bubble and dew point to know beforehand.
+    dH/dt = Q
+    H = (1 - v) cpL (T - T0) + v (latent + cpL (T_b - T0) + cpV (T - T_b))
+    0 <= v <= 1  perp  sum_i (x_i - y_i)
+    y_i = K_i x_i,   x_i (1 + v (K_i - 1)) = z_i,   K_i = p_i(T)/P
 
-T_b, where latent heat is counted, is the bubble point of the feed.  So the exact times follow from the bubble and the dew point.
+H is the enthalpy of 1 kmol.
 """
 
 import pandas as pd
@@ -21,7 +29,10 @@ from scipy.optimize import brentq
 import pyomo_fesd
 
 FEED = {'benzene': 0.5, 'toluene': 0.5}  # kmol
-ANTOINE = {'benzene': (6.90565, 1211.033, 220.79), 'toluene': (6.95464, 1344.8, 219.482)}  # mmHg, degC
+ANTOINE = {
+    'benzene': (6.90565, 1211.033, 220.79),
+    'toluene': (6.95464, 1344.8, 219.482),
+}  # mmHg, degC
 PRESSURE = 760.0  # mmHg
 T0 = 340.0  # K
 CP_LIQUID, CP_VAPOUR = 150.0, 100.0  # kJ/(kmol K)
@@ -32,23 +43,33 @@ PICTURE = 'flash.png'
 
 
 def equilibrium_ratio(i, T):
-    """K of Raoult's law with Antoine's vapour pressure."""
+    """K value of Raoult's law with Antoine's vapour pressure."""
     A, B, C = ANTOINE[i]
     return 10 ** (A - B / (C + T - 273.15)) / PRESSURE
 
 
 def bubble_point():
     """Temperature at which the first vapour appears (K)."""
-    return brentq(lambda T: sum(z * equilibrium_ratio(i, T) for i, z in FEED.items()) - 1, 300, 400, xtol=1e-12)
+    return brentq(
+        lambda T: sum(z * equilibrium_ratio(i, T) for i, z in FEED.items()) - 1,
+        300,
+        400,
+        xtol=1e-12,
+    )
 
 
 def dew_point():
     """Temperature at which the last liquid disappears (K)."""
-    return brentq(lambda T: sum(z / equilibrium_ratio(i, T) for i, z in FEED.items()) - 1, 300, 400, xtol=1e-12)
+    return brentq(
+        lambda T: sum(z / equilibrium_ratio(i, T) for i, z in FEED.items()) - 1,
+        300,
+        400,
+        xtol=1e-12,
+    )
 
 
 T_B = bubble_point()
-#: When it begins to boil, and when it is dry (s).
+#: Exact times (s) at which the mixture begins to boil and is dry.
 EXACT = (
     CP_LIQUID * (T_B - T0) / DUTY,
     (LATENT + CP_LIQUID * (T_B - T0) + CP_VAPOUR * (dew_point() - T_B)) / DUTY,
@@ -56,18 +77,20 @@ EXACT = (
 
 
 def build():
-    """The flash as an engineer writes it: temperature, vapour fraction, compositions and K-values are algebraic variables."""
+    """Build the flash with one mixed complementarity for the phases."""
     m = heated()
 
     @m.Complementarity(m.t)
     def phases(m, t):
-        return complements(pyo.inequality(0, m.v[t], 1), sum(m.x[t, i] - m.y[t, i] for i in m.i))
+        return complements(
+            pyo.inequality(0, m.v[t], 1), sum(m.x[t, i] - m.y[t, i] for i in m.i)
+        )
 
     return m
 
 
 def build_modes():
-    """The same with three modes, for comparison: it needs the enthalpies at the bubble and the dew point."""
+    """Build the plant with three modes; they need the bubble and the dew point."""
     m = heated()
     boils, dry = (DUTY * t for t in EXACT)
     m.phases = Disjunction(
@@ -82,12 +105,12 @@ def build_modes():
 
 
 def rachford_rice(m, t):
-    """sum_i (y_i - x_i) in terms of v, which the second mode is to define."""
+    """sum_i (y_i - x_i) as a function of v, which the second mode defines."""
     return sum(FEED[i] * (m.K[t, i] - 1) / (1 + m.v[t] * (m.K[t, i] - 1)) for i in m.i)
 
 
 def heated():
-    """Everything but the phases."""
+    """Build everything except the phase condition."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, HORIZON))
     m.i = pyo.Set(initialize=list(FEED))
@@ -126,9 +149,11 @@ def heated():
 
 
 def transform(m, nfe=20, ncp=2, scheme='LAGRANGE-RADAU'):
-    """Elements that find the switches; v comes and goes without a jump, which no equation alone can tell."""
+    """Make the elements movable; no equation shows that v is continuous."""
     pyo.TransformationFactory('fesd.dcs').apply_to(m)
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=nfe, ncp=ncp, scheme=scheme, continuous=[m.v])
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(
+        m, nfe=nfe, ncp=ncp, scheme=scheme, continuous=[m.v]
+    )
     return m
 
 
@@ -138,7 +163,7 @@ def solve(m, **keywords):
 
 
 def draw(m):
-    """Temperature, vapour fraction and compositions over time, the exact times marked."""
+    """Draw temperature, vapour fraction and compositions, with the exact times."""
     frame = pyomo_fesd.trajectory(m)
     figure = Figure(figsize=(7, 7), layout='constrained')
     temperature, fraction, composition = axes = figure.subplots(3, 1, sharex=True)
@@ -159,15 +184,24 @@ def draw(m):
 
 
 def main():
-    """Solve, say in words what was found, compare the sizes with those of three modes, draw."""
+    """Solve, print the answer, compare the size with that of three modes, draw."""
     m = build()
     results = solve(m)
     boils, dry = pyomo_fesd.switches(m)
     work = f'{results.solver.nlps} NLPs with {results.solver.nlp_iterations} iterations'
     print(f'mpec_hybrid: {results.solver.reason}; {work}.')
-    for switch, event, exact in ((boils, 'It boils', EXACT[0]), (dry, 'It is dry', EXACT[1])):
-        print(f'{event} from {switch.time:.9f} s on ({switch.before} -> {switch.after}), {switch.time - exact:+.1e} s off.')
-    sizes = {'mixed complementarity': pyomo_fesd.report(m), 'three modes': pyomo_fesd.report(transform(build_modes()))}
+    for switch, event, exact in (
+        (boils, 'It boils', EXACT[0]),
+        (dry, 'It is dry', EXACT[1]),
+    ):
+        print(
+            f'{event} from {switch.time:.9f} s on ({switch.before} -> {switch.after}), '
+            f'{switch.time - exact:+.1e} s off.'
+        )
+    sizes = {
+        'mixed complementarity': pyomo_fesd.report(m),
+        'three modes': pyomo_fesd.report(transform(build_modes())),
+    }
     print(pd.DataFrame(sizes).to_string())
     draw(m)
     print(f'Temperature, vapour fraction and compositions over time: {PICTURE}')

@@ -1,14 +1,22 @@
-"""Gas-liquid tank: the outlet takes liquid while the level is above it, gas below; after the switch the level slides on it.
+"""
+Gas-liquid tank: a sliding mode in a pressure vessel
+====================================================
+
+A closed tank is fed with liquid and gas. Its outlet lets out liquid while the level
+is above it, and gas while the level is below it. The level falls to the outlet and
+then slides there: neither mode alone can hold it, but a mixture of both can. The
+fraction nu of the liquid mode lets out as much liquid as comes in, nu f (P - P_out) =
+F_L, and the remaining 1 - nu lets the pressure fall. The answer is compared with a
+reference that integrates each piece and locates the event between them; three ways of
+writing the model give the same answer. ::
 
     liquid mode (M_L/rho_L > V_s):  dM_G/dt = F_G,      dM_L/dt = F_L - L
     gas mode    (M_L/rho_L < V_s):  dM_G/dt = F_G - G,  dM_L/dt = F_L
     M_G R T/P + M_L/rho_L = V,      L = G = f (P - P_out)
 
-Once the level has fallen to the outlet neither mode can hold it there, both together do: the fraction nu of the liquid mode
-lets just as much liquid out as comes in,  nu f (P - P_out) = F_L,  and the remaining 1 - nu lets the pressure fall.
-
-Source: paper, eq. (22) and (23), Table 1, Figs. 4 and 5; Moudgalya and Ryali (2001).  The paper's switching time of 9.37 s
-belongs to a start at 35 atm exactly (M_G0 = 6.824524 mol); with its rounded M_G0 = 6.83 mol it is 9.35 s.
+Source: paper, eq. (22) and (23), Table 1, Figs. 4 and 5; Moudgalya and Ryali (2001).
+The paper's switching time of 9.37 s belongs to a start at exactly 35 atm (M_G0 =
+6.824524 mol); with its rounded M_G0 = 6.83 mol the time is 9.35 s.
 """
 
 import pandas as pd
@@ -29,13 +37,14 @@ VALVE = 0.1  # mol/(s atm)
 M_G0, M_L0 = 6.83, 260.0  # mol
 HORIZON = 20.0  # s
 
-#: Event-located reference: switching time (s), gas holdup (mol) and pressure (atm) at the end.
+#: Reference with located event: switching time (s); gas holdup (mol) and pressure (atm)
+#: at the end.
 EXACT = {'t_s': 9.354868538871, 'M_G': 5.496072704665, 'P': 27.059474275603}
 PICTURE = 'gas_liquid_tank.png'
 
 
 def build():
-    """The tank as an engineer writes it: pressure and outlet flows are algebraic variables, the modes say what flows."""
+    """Build the tank; pressure and outlet flows are algebraic variables."""
     m = balances()
     m.liquid = Disjunct(m.t, rule=liquid)
     m.gas = Disjunct(m.t, rule=gas)
@@ -44,7 +53,7 @@ def build():
 
 
 def build_in_blocks():
-    """The same with a block for the outlet at every time, which holds the two modes and the Disjunction."""
+    """Build it with the modes and the Disjunction in a Block over time."""
     m = balances()
 
     @m.Block(m.t)
@@ -57,9 +66,11 @@ def build_in_blocks():
 
 
 def build_eliminated():
-    """The same without algebraic variables: the modes give the derivatives of the holdups, as in eq. (22a) and (22b)."""
+    """Build it without algebraic variables: the modes define the derivatives."""
     m = holdups()
-    m.P = pyo.Expression(m.t, rule=lambda m, t: m.M_G[t] * R * T / (V - m.M_L[t] / RHO_L))
+    m.P = pyo.Expression(
+        m.t, rule=lambda m, t: m.M_G[t] * R * T / (V - m.M_L[t] / RHO_L)
+    )
 
     @m.Disjunct(m.t)
     def liquid(d, t):
@@ -80,7 +91,7 @@ def build_eliminated():
 
 
 def holdups():
-    """The two states (mol) with their derivatives and initial values."""
+    """Declare the two states (mol), their derivatives and initial values."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, HORIZON))
     m.M_G = pyo.Var(m.t, initialize=M_G0, bounds=(0, None))
@@ -93,7 +104,7 @@ def holdups():
 
 
 def balances():
-    """The tank with pressure (atm) and outlet flows (mol/s); nothing says yet what flows."""
+    """Write the balances; pressure in atm, outlet flows in mol/s, no modes."""
     m = holdups()
     m.P = pyo.Var(m.t, initialize=35.0, bounds=(P_OUT, None))
     m.L = pyo.Var(m.t, initialize=1.0)
@@ -115,7 +126,7 @@ def balances():
 
 
 def liquid(d, t):
-    """Mode of a level above the outlet: liquid flows."""
+    """Mode with the level above the outlet: liquid flows."""
     m = d.model()
     d.region = pyo.Constraint(expr=m.M_L[t] / RHO_L >= V_S)
     d.L = pyo.Constraint(expr=m.L[t] == through_valve(m, t))
@@ -123,7 +134,7 @@ def liquid(d, t):
 
 
 def gas(d, t):
-    """Mode of a level below the outlet: gas flows."""
+    """Mode with the level below the outlet: gas flows."""
     m = d.model()
     d.region = pyo.Constraint(expr=m.M_L[t] / RHO_L <= V_S)
     d.L = pyo.Constraint(expr=m.L[t] == 0)
@@ -131,37 +142,56 @@ def gas(d, t):
 
 
 def through_valve(m, t):
-    """What the valve lets through, liquid or gas, in mol/s (eq. 22d)."""
+    """Flow through the valve, liquid or gas, in mol/s (eq. 22d)."""
     return VALVE * (m.P[t] - P_OUT)
 
 
 def solve(m, nfe=100, ncp=3):
-    """Elements by Radau's scheme, then the solver; returns its results."""
+    """Transform with Radau elements and solve; returns the solver's results."""
     pyo.TransformationFactory('fesd.dcs').apply_to(m)
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, wrt=m.t, nfe=nfe, ncp=ncp)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(
+        m, wrt=m.t, nfe=nfe, ncp=ncp
+    )
     return pyo.SolverFactory('mpec_hybrid').solve(m)
 
 
 def found(m):
-    """What ``EXACT`` lists, as solved."""
+    """Values of the solved model for the names in ``EXACT``."""
     (switch,) = pyomo_fesd.switches(m, m.t)
-    return {'t_s': switch.time, 'M_G': m.M_G[HORIZON].value, 'P': pyo.value(m.P[HORIZON])}
+    return {
+        't_s': switch.time,
+        'M_G': m.M_G[HORIZON].value,
+        'P': pyo.value(m.P[HORIZON]),
+    }
 
 
 def draw(m):
-    """Liquid holdup, pressure, fraction of the liquid mode and element lengths over time, the true switch marked."""
-    frame, elements, t_s = pyomo_fesd.trajectory(m, m.t), pyomo_fesd.element_lengths(m, m.t), found(m)['t_s']
+    """Draw holdup, pressure, liquid fraction and element lengths over time."""
+    frame, elements, t_s = (
+        pyomo_fesd.trajectory(m, m.t),
+        pyomo_fesd.element_lengths(m, m.t),
+        found(m)['t_s'],
+    )
     figure = Figure(figsize=(10, 6), layout='constrained')
     (holdup, pressure), (fraction, length) = axes = figure.subplots(2, 2, sharex=True)
     holdup.plot(frame['M_L'])
     holdup.set_ylabel('liquid holdup $M_L$ (mol)')
-    holdup.annotate('exact switch', (EXACT['t_s'], 0.9), (4, 0), ('data', 'axes fraction'), 'offset points', color='0.4')
+    holdup.annotate(
+        'exact switch',
+        (EXACT['t_s'], 0.9),
+        (4, 0),
+        ('data', 'axes fraction'),
+        'offset points',
+        color='0.4',
+    )
     pressure.plot(frame['P'])
     pressure.set_ylabel('pressure $P$ (atm)')
-    for part in (frame[frame.index <= t_s], frame[frame.index > t_s]):  # it jumps
+    for part in (frame[frame.index <= t_s], frame[frame.index > t_s]):  # discontinuous
         fraction.plot(part['outlet: liquid'], color='C0')
     fraction.set_ylabel('fraction ν of the liquid mode')
-    length.stairs(elements['length'], [0, *elements['end']], baseline=None, linewidth=1.5)
+    length.stairs(
+        elements['length'], [0, *elements['end']], baseline=None, linewidth=1.5
+    )
     length.set_ylabel('element length $h_n$ (s)')
     for axis in axes.flat:
         axis.axvline(EXACT['t_s'], color='0.4', linestyle='--', linewidth=0.8)
@@ -171,33 +201,62 @@ def draw(m):
     figure.savefig(PICTURE, dpi=150)
 
 
-def tell(m):
-    """Say in words what was found, with errors."""
+def describe(m):
+    """Print the answer with its errors."""
     (switch,) = pyomo_fesd.switches(m, m.t)
     values, lengths = found(m), pyomo_fesd.element_lengths(m, m.t)['length']
     error = {name: value - EXACT[name] for name, value in values.items()}
     end = pyomo_fesd.trajectory(m, m.t).iloc[-1]
-    nu, leaving = end['outlet: liquid'], end['outlet: liquid'] * VALVE * (end['P'] - P_OUT)
-    print(f"The level falls to the outlet at {switch.time:.9f} s, {error['t_s']:+.1e} s off the exact time.")
-    print(f"There it stays ({switch.after}), at the end {end['M_L'] / RHO_L - V_S:+.0e} L off.")
-    print(f"By then the fraction {nu:.6f} of the flow is liquid: {leaving:.6f} mol/s, {leaving - F_L:+.0e} off the feed.")
+    nu, leaving = (
+        end['outlet: liquid'],
+        end['outlet: liquid'] * VALVE * (end['P'] - P_OUT),
+    )
+    print(
+        f"The level falls to the outlet at {switch.time:.9f} s, {error['t_s']:+.1e} s "
+        "off the exact time."
+    )
+    print(
+        f"There it stays ({switch.after}), "
+        f"at the end {end['M_L'] / RHO_L - V_S:+.0e} L off."
+    )
+    print(
+        f"By then the fraction {nu:.6f} of the flow is liquid: {leaving:.6f} mol/s, "
+        f"{leaving - F_L:+.0e} off the feed."
+    )
     for name, unit in (('M_G', 'mol'), ('P', 'atm')):
-        print(f'{name}(20 s) = {values[name]:.9f} {unit}, {error[name]:+.1e} {unit} off.')
-    print(f"The elements are {lengths.iloc[0]:.6f} s long before the switch and {lengths.iloc[-1]:.6f} s after it.")
+        print(
+            f'{name}(20 s) = {values[name]:.9f} {unit}, {error[name]:+.1e} {unit} off.'
+        )
+    print(
+        f"The elements are {lengths.iloc[0]:.6f} s long before the switch and "
+        f"{lengths.iloc[-1]:.6f} s after it."
+    )
 
 
 def main():
-    """Solve all three forms, say in words what was found, compare them, draw the first."""
-    forms = {'as written': build(), 'in blocks': build_in_blocks(), 'eliminated': build_eliminated()}
+    """Solve all three forms, print and compare the answers, draw the first."""
+    forms = {
+        'as written': build(),
+        'in blocks': build_in_blocks(),
+        'eliminated': build_eliminated(),
+    }
     for m in forms.values():
         solve(m)
-    tell(forms['as written'])
+    describe(forms['as written'])
     sizes = pd.DataFrame({name: pyomo_fesd.report(m) for name, m in forms.items()})
-    errors = pd.DataFrame({name: pd.Series(found(m)) - pd.Series(EXACT) for name, m in forms.items()})
+    errors = pd.DataFrame(
+        {name: pd.Series(found(m)) - pd.Series(EXACT) for name, m in forms.items()}
+    )
     print(f'\nThree ways to write it, their sizes:\n{sizes.to_string()}')
-    print(f'and their errors in s, mol, atm:\n{errors.to_string(float_format="{:+.1e}".format)}\n')
+    print(
+        'and their errors in s, mol, '
+        f'atm:\n{errors.to_string(float_format="{:+.1e}".format)}\n'
+    )
     draw(forms['as written'])
-    print(f'Holdup, pressure, fraction of the liquid mode and element lengths over time: {PICTURE}')
+    print(
+        'Holdup, pressure, fraction of the liquid mode and element lengths over time: '
+        f'{PICTURE}'
+    )
 
 
 if __name__ == '__main__':

@@ -1,16 +1,23 @@
-"""Two genes that regulate one another: modes in which one condition does not matter, and the two forms that write them.
+"""
+Gene network: conditions that do not matter, and two forms
+==========================================================
 
-    dx1/dt = 40 s(x2 > 4) s(x1 < 8) - 4.5 x1        dx2/dt = 40 s(x1 > 4) s(x2 < 8) - 1.5 x2
+Two genes regulate one another. A gene is expressed where the other protein is above
+its first threshold and its own protein is below the second one. Each gene has three
+modes. In the mode ``starved`` (too little of the other protein) the own threshold
+does not matter, so this mode has one condition only, and the Heaviside form is a
+third smaller than Stewart's. From (10, 3) gene 1 is starved first and saturated next;
+in both modes protein 1 decays. At 8 it begins to slide, with gene 1 expressed for
+36/40 = 90 % of the maximum. Protein 2 rises to 8 and slides there too, with gene 2
+expressed for 12/40 = 30 %. The exact times follow from exponentials. ::
 
-s is 1 where its condition holds and 0 elsewhere: a gene is expressed where the other protein is above its first threshold AND
-its own is below the second.  So each gene has three modes.  Where it is ``starved`` of the other protein, its own threshold does
-not matter: that mode has one condition only.
+    dx1/dt = 40 s(x2 > 4) s(x1 < 8) - 4.5 x1
+    dx2/dt = 40 s(x1 > 4) s(x2 < 8) - 1.5 x2
 
-From (10, 3) gene 1 is starved first and saturated next; in both modes protein 1 decays.  At 8 it begins to slide: gene 1 is
-expressed for 36/40 = 90 % of what it could be.  Protein 2 rises to 8 and slides there too, gene 2 expressed for 12/40 = 30 %.
+s is 1 where its condition holds and 0 elsewhere. All quantities are dimensionless.
 
-Source: Acary, de Jong, Brogliato, Numerical simulation of piecewise-linear models of gene regulatory networks using
-complementarity systems, Physica D 269 (2014).  Time and concentrations have no unit here.
+Source: Acary, de Jong, Brogliato, Numerical simulation of piecewise-linear models of
+gene regulatory networks using complementarity systems, Physica D 269 (2014).
 """
 
 from math import log
@@ -28,7 +35,7 @@ PICTURE = 'gene_network.png'
 
 
 def build():
-    """Both genes with three modes over time."""
+    """Build both genes with three modes each."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, END))
     m.gene = pyo.Set(initialize=[1, 2])
@@ -67,10 +74,10 @@ def build():
 
 
 def exact_switches():
-    """Exact times: gene 1 is fed, protein 1 has decayed to its second threshold, protein 2 has risen to its own."""
+    """Exact times: gene 1 is fed, protein 1 falls to 8, protein 2 rises to 8."""
 
     def when(i, goal, rate):
-        """Time in which protein ``i`` goes from its start to ``goal`` while it is made at ``rate``."""
+        """Time of protein ``i`` from its start to ``goal`` at the given rate."""
         limit = rate / DECAY[i]
         return log((limit - START[i]) / (limit - goal)) / DECAY[i]
 
@@ -86,11 +93,13 @@ def solve(form='auto', nfe=16, ncp=3):
 
 
 def main():
-    """Solve in both forms, print switches and sizes, draw the proteins and the modes."""
+    """Solve in both forms, print switches and sizes, draw proteins and modes."""
     for form in ('stewart', 'heaviside'):
         m, results = solve(form)
         size = pyomo_fesd.report(m)
-        numbers = ', '.join(f'{size[name]} {name}' for name in ('variables', 'constraints', 'pairs'))
+        numbers = ', '.join(
+            f'{size[name]} {name}' for name in ('variables', 'constraints', 'pairs')
+        )
         print(f"{form}: {numbers}; {results.solver.nlp_iterations} iterations")
     for switch, exact in zip(pyomo_fesd.switches(m), exact_switches()):
         print(f"{switch}, {switch.time - exact:+.1e} off the exact time")
@@ -98,7 +107,9 @@ def main():
     for i in m.gene:
         share = last[f'regulation[{i}]: expressed[{i}]']
         print(f"At the end gene {i} is expressed for {share:.6f} of what it could be.")
-    pyomo_fesd.plot(m, m.t, ['x', 'regulation[1]', 'regulation[2]']).savefig(PICTURE, dpi=150)
+    pyomo_fesd.plot(m, m.t, ['x', 'regulation[1]', 'regulation[2]']).savefig(
+        PICTURE, dpi=150
+    )
     print(f'Picture: {PICTURE}')
 
 

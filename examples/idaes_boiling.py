@@ -1,12 +1,17 @@
-"""An IDAES property package through boiling to dryness: the smooth phase equilibrium made exact.
+"""
+IDAES property package through boiling to dryness
+=================================================
 
-    dh/dt = Q,     h = h(T, P, z),     T_eq = min(max(T, T_bubble), T_dew),     x_i p_i(T_eq) = y_i P
+1 mol of benzene and toluene, 50/50, at 760 mmHg, is heated with 100 W from 340 K
+until it boils and until it is dry, with an IDAES property package. IDAES' SmoothVLE
+lets both phases exist at all temperatures, in equilibrium at T_eq, and smooths max
+and min. ``fesd.smooth_to_complementarity`` makes them exact, with two pairs at each
+time; the elements find the times of the first bubble and of the last drop.
+``smaller`` is the same vessel without bubble and dew point: ``pyomo_fesd.units.vle``,
+one condition. Data and exact times are those of ``flash``. ::
 
-IDAES' SmoothVLE lets both phases exist at all temperatures, in equilibrium at T_eq, and rounds max and min off.  One call,
-``fesd.smooth_to_complementarity``, makes them exact, two pairs at each time; elements find when the first bubble appears and when
-the last drop is gone.  ``smaller`` is the same vessel without bubble and dew point: ``pyomo_fesd.units.vle``, one condition.
-
-1 mol of benzene and toluene, 50/50, at 760 mmHg, is heated with 100 W from 340 K.  Data and exact times are those of ``flash``.
+    dh/dt = Q,     h = h(T, P, z)
+    T_eq = min(max(T, T_bubble), T_dew),     x_i p_i(T_eq) = y_i P
 """
 
 import logging
@@ -32,10 +37,14 @@ from flash import (
     heated,
 )
 from idaes.core import Component, FlowsheetBlock, LiquidPhase, VaporPhase
-from idaes.models.properties.modular_properties.base.generic_property import GenericParameterBlock
+from idaes.models.properties.modular_properties.base.generic_property import (
+    GenericParameterBlock,
+)
 from idaes.models.properties.modular_properties.eos.ideal import Ideal
 from idaes.models.properties.modular_properties.phase_equil import SmoothVLE
-from idaes.models.properties.modular_properties.phase_equil.bubble_dew import IdealBubbleDew
+from idaes.models.properties.modular_properties.phase_equil.bubble_dew import (
+    IdealBubbleDew,
+)
 from idaes.models.properties.modular_properties.phase_equil.forms import fugacity
 from idaes.models.properties.modular_properties.pure import NIST
 from idaes.models.properties.modular_properties.state_definitions import FTPx
@@ -61,38 +70,44 @@ class Caloric:
     class enth_mol_liq_comp:
         @staticmethod
         def build_parameters(component):
-            """There are none."""
+            """No parameters."""
 
         @staticmethod
         def return_expression(b, component, T):
-            """Of the liquid, from T0."""
+            """Enthalpy of the liquid, from T0."""
             return CP_LIQUID * HEAT_CAPACITY * (T - T0 * units.K)
 
     class enth_mol_ig_comp:
         @staticmethod
         def build_parameters(component):
-            """There are none."""
+            """No parameters."""
 
         @staticmethod
         def return_expression(b, component, T):
-            """Of the vapour."""
-            return (LATENT + CP_LIQUID * (T_B - T0)) * HEAT + CP_VAPOUR * HEAT_CAPACITY * (T - T_B * units.K)
+            """Enthalpy of the vapour."""
+            return (
+                LATENT + CP_LIQUID * (T_B - T0)
+            ) * HEAT + CP_VAPOUR * HEAT_CAPACITY * (T - T_B * units.K)
 
     class dens_mol_liq_comp:
         @staticmethod
         def build_parameters(component):
-            """There are none."""
+            """No parameters."""
 
         @staticmethod
         def return_expression(b, component, T):
-            """Only asked for away from the reference pressure."""
+            """Density, used only away from the reference pressure."""
             return 1e4 * units.mol / units.m**3
 
 
 def component(name, critical):
     """One component of the package, with Antoine's equation in bar and K."""
     A, B, C = ANTOINE[name]
-    coefficients = {'A': A - log10(MMHG_PER_BAR), 'B': (B, units.K), 'C': (C - 273.15, units.K)}
+    coefficients = {
+        'A': A - log10(MMHG_PER_BAR),
+        'B': (B, units.K),
+        'C': (C - 273.15, units.K),
+    }
     return {
         'type': Component,
         'enth_mol_liq_comp': Caloric,
@@ -108,12 +123,21 @@ def component(name, critical):
 
 
 PACKAGE = {
-    'components': {'benzene': component('benzene', 562.2), 'toluene': component('toluene', 591.8)},
+    'components': {
+        'benzene': component('benzene', 562.2),
+        'toluene': component('toluene', 591.8),
+    },
     'phases': {
         'Liq': {'type': LiquidPhase, 'equation_of_state': Ideal},
         'Vap': {'type': VaporPhase, 'equation_of_state': Ideal},
     },
-    'base_units': dict(time=units.s, length=units.m, mass=units.kg, amount=units.mol, temperature=units.K),
+    'base_units': dict(
+        time=units.s,
+        length=units.m,
+        mass=units.kg,
+        amount=units.mol,
+        temperature=units.K,
+    ),
     'state_definition': FTPx,
     'state_bounds': {
         'flow_mol': (0, 1, 10, units.mol / units.s),
@@ -129,7 +153,7 @@ PACKAGE = {
 
 
 def build():
-    """A closed vessel: the enthalpy is the state, temperature and phases follow from the package."""
+    """Build a closed vessel; the state is the enthalpy, the package gives the rest."""
     m = pyo.ConcreteModel()
     m.fs = FlowsheetBlock(dynamic=True, time_set=[0, HORIZON], time_units=units.s)
     m.fs.props = GenericParameterBlock(**PACKAGE)
@@ -150,16 +174,20 @@ def build():
 
 
 def guess(t):
-    """A temperature (K) between the events, without any care."""
+    """Rough guess of the temperature (K)."""
     boils, dry = EXACT
     T_D = dew_point()
     if t < boils:
         return T0 + (T_B - T0) * t / boils
-    return T_B + (T_D - T_B) * (t - boils) / (dry - boils) if t < dry else T_D + 0.1 * (t - dry)
+    return (
+        T_B + (T_D - T_B) * (t - boils) / (dry - boils)
+        if t < dry
+        else T_D + 0.1 * (t - dry)
+    )
 
 
 def initialise(m):
-    """IDAES' own initialisation of the package at a guess of the temperature."""
+    """Run IDAES' own initialisation of the package at a guess of the temperature."""
     for t, state in m.fs.vessel.items():
         state.flow_mol.fix(1)
         state.pressure.fix(PRESSURE)
@@ -176,27 +204,39 @@ def initialise(m):
 
 
 def smooth(nfe=20, ncp=2):
-    """IDAES as it is, on equal elements; initialised, not solved."""
+    """Build IDAES' smooth model on equal elements; initialised, not solved."""
     m = build()
-    pyo.TransformationFactory('dae.collocation').apply_to(m.fs, wrt=m.fs.time, nfe=nfe, ncp=ncp)
+    pyo.TransformationFactory('dae.collocation').apply_to(
+        m.fs, wrt=m.fs.time, nfe=nfe, ncp=ncp
+    )
     return initialise(m)
 
 
 def exact(m):
-    """The initialised flowsheet with exact phases, its elements movable."""
+    """Make the phases exact and the elements movable."""
     temperatures = pyo.Reference(m.fs.vessel[:].temperature)
     pyo.TransformationFactory('fesd.smooth_to_complementarity').apply_to(m.fs)
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m.fs, wrt=m.fs.time, continuous=[temperatures])
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(
+        m.fs, wrt=m.fs.time, continuous=[temperatures]
+    )
     return m
 
 
 def smaller(nfe=20, ncp=2):
-    """The equations of the package with ``units.vle``: no bubble and no dew point, compositions as Expressions."""
+    """Build the same equations with ``units.vle``, without bubble and dew point."""
     m = heated()
     for name in ('liquid', 'vapour', 'x', 'y'):
         m.del_component(name)
-    m.phases = vle(m.t, components=m.i, fraction=m.v, composition=lambda m, t, i: FEED[i], ratio=m.K)
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, wrt=m.t, nfe=nfe, ncp=ncp)
+    m.phases = vle(
+        m.t,
+        components=m.i,
+        fraction=m.v,
+        composition=lambda m, t, i: FEED[i],
+        ratio=m.K,
+    )
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(
+        m, wrt=m.t, nfe=nfe, ncp=ncp
+    )
     return m
 
 
@@ -208,21 +248,30 @@ def solve(m):
 
 
 def switching_times(m):
-    """Where elements end nearest to the bubble and to the dew point (s): a kink of the package has no name in ``switches``."""
-    table, ends = pyomo_fesd.trajectory(m, m.fs.time)[TEMPERATURE], pyomo_fesd.element_lengths(m, m.fs.time)['end']
+    """Element boundaries (s) nearest to bubble and dew point.
+
+    ``switches`` does not name nonsmooth terms.
+    """
+    table, ends = (
+        pyomo_fesd.trajectory(m, m.fs.time)[TEMPERATURE],
+        pyomo_fesd.element_lengths(m, m.fs.time)['end'],
+    )
     inner = ends.iloc[:-1]
     at = np.interp(inner, table.index, table)
     return [inner.iloc[int(np.argmin(abs(at - T)))] for T in (T_B, dew_point())]
 
 
 def largest_error(m):
-    """Largest distance (K) of the temperature from the exact one, which two brackets per time give."""
+    """Largest error (K) of the temperature."""
     table = pyomo_fesd.trajectory(m, m.fs.time)
-    return max(abs(T - temperature(h)) for T, h in zip(table[TEMPERATURE], table['fs.enthalpy']))
+    return max(
+        abs(T - temperature(h))
+        for T, h in zip(table[TEMPERATURE], table['fs.enthalpy'])
+    )
 
 
 def temperature(h):
-    """Temperature (K) of the mixture of enthalpy h (J/mol)."""
+    """Exact temperature (K) at the enthalpy h (J/mol)."""
     boils, dry = (DUTY * t for t in EXACT)
     if h <= boils:
         return T0 + h / CP_LIQUID
@@ -231,24 +280,29 @@ def temperature(h):
         return T_B + (h - vapour) / CP_VAPOUR
 
     def surplus(T):
-        """Rachford and Rice at the vapour fraction that the enthalpy asks for."""
+        """Rachford-Rice residual at the vapour fraction that satisfies the enthalpy."""
         liquid = CP_LIQUID * (T - T0)
         v = (h - liquid) / (vapour + CP_VAPOUR * (T - T_B) - liquid)
         ratios = {i: equilibrium_ratio(i, T) for i in FEED}
-        return sum(z * (ratios[i] - 1) / (1 + v * (ratios[i] - 1)) for i, z in FEED.items())
+        return sum(
+            z * (ratios[i] - 1) / (1 + v * (ratios[i] - 1)) for i, z in FEED.items()
+        )
 
     return brentq(surplus, T_B, dew_point(), xtol=1e-12)
 
 
 def draw(m, rounded):
-    """Temperature and vapour fraction; the smooth package's distance from the exact temperature."""
+    """Draw temperature, vapour fraction, and the error of the temperature."""
     figure = Figure(figsize=(7, 7), layout='constrained')
     level, fraction, error = axes = figure.subplots(3, 1, sharex=True)
     for model, label, style in ((m, 'exact', 'C0.-'), (rounded, 'SmoothVLE', 'C1.-')):
         table = pyomo_fesd.trajectory(model, model.fs.time)
         level.plot(table[TEMPERATURE], style, markersize=3, label=label)
         fraction.plot(table['fs.vessel.flow_mol_phase[Vap]'], style, markersize=3)
-        distance = [abs(T - temperature(h)) for T, h in zip(table[TEMPERATURE], table['fs.enthalpy'])]
+        distance = [
+            abs(T - temperature(h))
+            for T, h in zip(table[TEMPERATURE], table['fs.enthalpy'])
+        ]
         error.semilogy(table.index, np.maximum(distance, 1e-13), style, markersize=3)
     level.set_ylabel('temperature (K)')
     level.legend()
@@ -262,7 +316,7 @@ def draw(m, rounded):
 
 
 def main():
-    """Solve the package as it is and made exact, and the smaller equations; say what was found, draw."""
+    """Solve all three models, print the answers, draw."""
     rounded = smooth()
     m = exact(rounded.clone())
     solve(rounded)
@@ -271,12 +325,23 @@ def main():
     for name, time, known in zip(('It boils', 'It is dry'), switching_times(m), EXACT):
         print(f'{name} from {time:.6f} s on, {time - known:+.1e} s off.')
     for name, model in (('exact package', m), ('SmoothVLE', rounded)):
-        print(f'Largest error of the temperature, {name}: {largest_error(model):.1e} K.')
+        print(
+            f'Largest error of the temperature, {name}: {largest_error(model):.1e} K.'
+        )
     small = smaller()
     solve(small)
     for switch, known in zip(pyomo_fesd.switches(small), EXACT):
-        print(f'units.vle: {switch.time:.6f} s ({switch.before} -> {switch.after}), {switch.time - known:+.1e} s off.')
-    print(pd.DataFrame({'package': pyomo_fesd.report(m), 'units.vle': pyomo_fesd.report(small)}).head(4).to_string())
+        print(
+            f'units.vle: {switch.time:.6f} s ({switch.before} -> {switch.after}), '
+            f'{switch.time - known:+.1e} s off.'
+        )
+    print(
+        pd.DataFrame(
+            {'package': pyomo_fesd.report(m), 'units.vle': pyomo_fesd.report(small)}
+        )
+        .head(4)
+        .to_string()
+    )
     draw(m, rounded)
     print(f'Temperature, vapour fraction and error over time: {PICTURE}')
 

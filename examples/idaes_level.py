@@ -1,13 +1,18 @@
-"""Level control of an IDAES reactor with a valve that saturates: the controller's smooth bound made exact.
+"""
+IDAES level control with a saturating valve
+===========================================
 
-    mv = mid(0, mv_ref + K e + I, mv_ub),     dI/dt = K_i e + K_b (mv - (mv_ref + K e + I)),     e = setpoint - volume
+An IDAES reactor whose level is held by a ``PIDController`` with a saturating valve.
+IDAES bounds the output with ``smooth_bound``, which is off by up to eps/2 at a limit,
+with a default eps = 1e-4 in the unit of the output: a fortieth of the capacity of
+this valve. ``fesd.smooth_to_complementarity`` replaces it by two complementarity
+pairs, without a parameter. From far above the set point the valve is open, follows
+the controller, is closed for a while, and follows again; element boundaries find the
+three times. The density is constant, so the level does not depend on the reaction,
+and scipy integrates it separately between located events as a reference. ::
 
-IDAES' PIDController bounds its output by ``smooth_bound``, which is off by up to eps/2 at a limit, with a default eps = 1e-4 in
-whatever unit the output has: a fortieth of what this valve can pass.  One call, ``fesd.smooth_to_complementarity``, replaces it
-by two complementarity pairs; no parameter is left.  Begun far above the set point the valve is open, follows the controller, is
-closed for a while, and follows again; element boundaries find the three times.
-
-The density is constant, so the level does not depend on the reaction: scipy solves it apart, with events, as a reference.
+    mv = mid(0, mv_ref + K e + I, mv_ub),     e = setpoint - volume
+    dI/dt = K_i e + K_b (mv - (mv_ref + K e + I))
 """
 
 from collections import namedtuple
@@ -29,7 +34,12 @@ from pyomo_fesd.units import saturation, scale_by_values
 
 END = 600.0  # s
 START, SETPOINT = 1.2, 0.8  # m3
-CONTENTS = {'NaOH': 1.0, 'EthylAcetate': 1.0, 'SodiumAcetate': 49.0, 'Ethanol': 49.0}  # mol/m3, of a reactor at work
+CONTENTS = {
+    'NaOH': 1.0,
+    'EthylAcetate': 1.0,
+    'SodiumAcetate': 49.0,
+    'Ethanol': 49.0,
+}  # mol/m3, of a reactor in operation
 OPEN = 4e-3  # m3/s, through the valve when it is fully open
 GAIN, INTEGRAL, BACK = -0.02, -1e-3, 0.01  # 1/s, 1/s2, 1/s
 VOLUME = 'fs.cstr.control_volume.volume'
@@ -40,7 +50,7 @@ Change = namedtuple('Change', 'time now')
 
 
 def build(bounds=ControllerMVBoundType.SMOOTH_BOUND, times=(0, END)):
-    """Mixer, reactor and controller, as one writes them with IDAES; ``times`` may already hold boundaries of elements."""
+    """Build mixer, reactor and controller; ``times`` may hold element boundaries."""
     m = plant(times)
     m.fs.pid = PIDController(
         process_var=m.fs.cstr.volume,
@@ -56,29 +66,38 @@ def build(bounds=ControllerMVBoundType.SMOOTH_BOUND, times=(0, END)):
 
 
 def exact(m):
-    """The smooth bound becomes two pairs."""
+    """Replace the smooth bound by two complementarity pairs."""
     pyo.TransformationFactory('fesd.smooth_to_complementarity').apply_to(m.fs)
     return m
 
 
 def exact_by_hand(m):
-    """The same, smaller: one variable and no equation where the controller has its bound."""
+    """Replace the bound by hand: one variable and no equation."""
     pid = m.fs.pid
-    pid.del_component(pid.mv_eqn)  # pyomo.dae makes new times of a deactivated one active
-    m.fs.valve = saturation(m.fs.time, command=pid.mv_unbounded, output=m.fs.cstr.outlet.flow_vol, low=0, high=OPEN)
+    # deleted, since pyomo.dae activates a deactivated Constraint at new times
+    pid.del_component(pid.mv_eqn)
+    m.fs.valve = saturation(
+        m.fs.time,
+        command=pid.mv_unbounded,
+        output=m.fs.cstr.outlet.flow_vol,
+        low=0,
+        high=OPEN,
+    )
     return m
 
 
 def move(m, nfe, ncp):
-    """Elements that find when the valve saturates; what the user knows to be constant is named."""
+    """Make the elements movable; name the inputs that are known to be constant."""
     pid = m.fs.pid
     inputs = [pid.setpoint, pid.gain_p, pid.gain_i, pid.gain_b, pid.mv_ref]
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m.fs, wrt=m.fs.time, nfe=nfe, ncp=ncp, continuous=inputs)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(
+        m.fs, wrt=m.fs.time, nfe=nfe, ncp=ncp, continuous=inputs
+    )
     return m
 
 
 def specify(m):
-    """Inputs, initial values and a first guess of the discretised model."""
+    """Fix inputs and initial values of the discretised model and initialise it."""
     pid, start = m.fs.pid, m.fs.time.first()
     for parameter, number in (
         (pid.setpoint, SETPOINT),
@@ -101,7 +120,7 @@ def specify(m):
 
 
 def solve(m, **options):
-    """March through time, then solve all elements at once; returns the solver's results."""
+    """Simulate, then solve all elements at once; returns the solver's results."""
     pyomo_fesd.simulate(m.fs)
     results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=True, **options)
     pyo.assert_optimal_termination(results)
@@ -109,17 +128,19 @@ def solve(m, **options):
 
 
 def moving_grid(nfe=20, ncp=3, how=exact):
-    """The exact controller on moving elements; returns the model and the solver's results."""
+    """Solve the exact controller; returns the model and the solver's results."""
     m = specify(move(how(build()), nfe, ncp))
     return m, solve(m)
 
 
 def smooth(eps, known, ncp=3):
-    """IDAES' own controller with smoothing ``eps`` by pyomo.dae, on the elements of a solved model, begun at its values."""
+    """Solve IDAES' smooth controller on the elements of a solved model."""
     grid = boundaries(known)
     m = build(times=grid)
     m.fs.pid.smooth_eps.set_value(eps)
-    pyo.TransformationFactory('dae.collocation').apply_to(m.fs, wrt=m.fs.time, nfe=len(grid) - 1, ncp=ncp)
+    pyo.TransformationFactory('dae.collocation').apply_to(
+        m.fs, wrt=m.fs.time, nfe=len(grid) - 1, ncp=ncp
+    )
     specify(m)
     values = {name: [data.value for data in v.values()] for name, v in over_time(known)}
     for name, v in over_time(m):
@@ -131,23 +152,32 @@ def smooth(eps, known, ncp=3):
 
 
 def over_time(m):
-    """(name, family over time) of all variables of the flowsheet."""
-    _, families = flatten_dae_components(m.fs, m.fs.time, pyo.Var)
-    return [(str(pyo.ComponentUID(v.referent)), v) for v in families]
+    """Pairs (name, variable over time) of all variables of the flowsheet."""
+    _, variables = flatten_dae_components(m.fs, m.fs.time, pyo.Var)
+    return [(str(pyo.ComponentUID(v.referent)), v) for v in variables]
 
 
 def boundaries(m):
-    """Where the elements begin, and the end (s); to the 1e-6 s that labels have."""
+    """Element boundaries (s), rounded to the resolution 1e-6 s of the labels."""
     return [*pyomo_fesd.element_lengths(m, m.fs.time)['start'].round(6), END]
 
 
 def changes(m):
-    """When the valve reaches or leaves a limit."""
-    table, start = pyomo_fesd.trajectory(m, m.fs.time), pyomo_fesd.element_lengths(m, m.fs.time)['start']
+    """Times at which the valve reaches or leaves a limit."""
+    table, start = (
+        pyomo_fesd.trajectory(m, m.fs.time),
+        pyomo_fesd.element_lengths(m, m.fs.time)['start'],
+    )
     found, before = [], None
     for element, flow in table.groupby('element')[FLOW]:
-        inner = flow.iloc[:-1]  # the last point may lie on the next piece
-        now = 'open' if inner.min() > OPEN * (1 - 1e-6) else 'closed' if inner.max() < OPEN * 1e-6 else 'follows'
+        inner = flow.iloc[:-1]  # the last point may belong to the next piece
+        now = (
+            'open'
+            if inner.min() > OPEN * (1 - 1e-6)
+            else 'closed'
+            if inner.max() < OPEN * 1e-6
+            else 'follows'
+        )
         if before not in (None, now):
             found.append(Change(start[element], now))
         before = now
@@ -163,7 +193,7 @@ def _rates(t, y, valve):
     return INFLOW - flow, INTEGRAL * (SETPOINT - y[0]) + BACK * (flow - _asked(y))
 
 
-#: What the valve does -> (its flow, [(limit that is crossed, direction, what it does then)])
+#: State of the valve -> (flow, [(limit that is crossed, direction, next state)])
 MODES = {
     'open': (lambda asked: OPEN, [(OPEN, -1, 'follows')]),
     'closed': (lambda asked: 0.0, [(0.0, 1, 'follows')]),
@@ -180,15 +210,26 @@ def _event(limit, direction):
 
 
 def reference():
-    """The level by scipy: list of Change, and the volume at the end (m3)."""
+    """Integrate the level with scipy; returns the changes and the final volume (m3)."""
     found, t, y, now = [], 0.0, (START, 0.0), 'open'
     while t < END:
         valve, exits = MODES[now]
         events = [_event(limit, direction) for limit, direction, _ in exits]
-        piece = solve_ivp(_rates, (t, END), y, 'DOP853', events=events, args=(valve,), rtol=1e-13, atol=1e-15)
+        piece = solve_ivp(
+            _rates,
+            (t, END),
+            y,
+            'DOP853',
+            events=events,
+            args=(valve,),
+            rtol=1e-13,
+            atol=1e-15,
+        )
         t, y = piece.t[-1], piece.y[:, -1]
         if piece.status == 1:
-            now = next(then for times, (_, _, then) in zip(piece.t_events, exits) if len(times))
+            now = next(
+                then for times, (_, _, then) in zip(piece.t_events, exits) if len(times)
+            )
             found.append(Change(t, now))
     return found, y[0]
 
@@ -200,8 +241,10 @@ def largest_difference(m, rounded):
 
 
 def draw(m, rounded):
-    """Volume, and flow beside what the controller asks for; the smooth controller dashed."""
-    table, other = (pyomo_fesd.trajectory(model, model.fs.time) for model in (m, rounded))
+    """Draw volume, flow and demand; the smooth controller is dashed."""
+    table, other = (
+        pyomo_fesd.trajectory(model, model.fs.time) for model in (m, rounded)
+    )
     figure = Figure(figsize=(7, 6), layout='constrained')
     level, flow = axes = figure.subplots(2, 1, sharex=True)
     level.plot(table[VOLUME], label='exact')
@@ -223,19 +266,31 @@ def draw(m, rounded):
 
 
 def main():
-    """Solve, compare with scipy and with smaller and smaller smoothing, draw."""
+    """Solve, compare with scipy and with decreasing smoothing, draw."""
     m, results = moving_grid()
     known, end = reference()
     print(f'mpec_hybrid: {results.solver.reason}.')
     for change, exact_change in zip(changes(m), known):
         now = change.now if change.now == 'follows' else f'is {change.now}'
-        print(f'From {change.time:.6f} s on the valve {now}, {change.time - exact_change.time:+.1e} s off the reference.')
+        print(
+            f'From {change.time:.6f} s on the valve {now}, '
+            f'{change.time - exact_change.time:+.1e} s off the reference.'
+        )
     table = pyomo_fesd.trajectory(m, m.fs.time)
-    print(f'The flow stays within [{table[FLOW].min():.1e}, {table[FLOW].max():.9f}] m3/s.')
-    print(f'The volume ends at {table[VOLUME].iloc[-1]:.9f} m3, {table[VOLUME].iloc[-1] - end:+.1e} off.')
+    print(
+        f'The flow stays within [{table[FLOW].min():.1e}, {table[FLOW].max():.9f}] '
+        'm3/s.'
+    )
+    print(
+        f'The volume ends at {table[VOLUME].iloc[-1]:.9f} m3, '
+        f'{table[VOLUME].iloc[-1] - end:+.1e} off.'
+    )
     rounded = {eps: smooth(eps, m) for eps in (1e-3, 1e-4, 1e-5)}
     for eps, model in rounded.items():
-        print(f'With smooth_eps = {eps:.0e} m3/s the volume differs by up to {largest_difference(m, model):.1e} m3.')
+        print(
+            f'With smooth_eps = {eps:.0e} m3/s the volume differs by up to '
+            f'{largest_difference(m, model):.1e} m3.'
+        )
     draw(m, rounded[1e-3])
     print(f'Volume and flow over time: {PICTURE}')
 

@@ -1,13 +1,21 @@
-"""Two gas vessels in a row with a check valve between them and a relief valve on the second, in an IDAES flowsheet block.
+"""
+IDAES gas vessels with check valve and relief valve
+===================================================
+
+Two gas vessels in a row in an IDAES flowsheet block, with a check valve between them
+and a relief valve on the second. The second vessel starts at the higher pressure, so
+nothing flows until the first has caught up. The relief valve opens at 5 bar and
+reseats at 4 bar: in between it has hysteresis. Each addition is one line
+(``add_valves``). The time at which the first vessel catches up is known exactly; the
+reference for the relief cycles integrates the same equations between located events
+with scipy. ::
 
     feed --> vessel 1 --check valve--> vessel 2 --relief valve--> flare
 
-    n1' = f - F,    n2' = F - G,    p = n R T/V,    0 <= F perp F/k - (p1 - p2) >= 0,    G = 0 or c (p2 - 1 bar)
+    n1' = f - F,    n2' = F - G,    p = n R T/V
+    0 <= F perp F/k - (p1 - p2) >= 0,    G = 0 or c (p2 - 1 bar)
 
-The second vessel starts at the higher pressure, so nothing flows until the first has caught up.  The relief valve pops at 5 bar
-and reseats at 4 bar: between the two it remembers.  Each addition is one line (``add_valves``).
-
-Isothermal ideal gas; amounts in mol, pressures in bar, time in s.  Reference: the same equations between events, by scipy.
+Isothermal ideal gas. Units: mol, bar, s.
 """
 
 import pyomo.dae as dae
@@ -25,7 +33,7 @@ CAPACITY = 1.0 / (8.314462618e-5 * 300)  # mol/bar: V/(R T) of 1 m3
 START = {1: 1.0, 2: 2.0}  # bar
 K_CHECK, K_RELIEF = 4.0, 3.0  # mol/s/bar
 POPS, RESEATS, FLARE = 5.0, 4.0, 1.0  # bar
-#: The first vessel has caught up (s), exact.
+#: Exact time (s) at which the first vessel has caught up.
 CATCHES_UP = (START[2] - START[1]) * CAPACITY / FEED
 PICTURE = 'idaes_relief.png'
 units = pyo.units
@@ -33,19 +41,26 @@ FLOW = units.mol / units.s
 
 
 def build():
-    """The flowsheet with both valves."""
+    """Build the flowsheet with both valves."""
     m = vessels()
     add_valves(m)
     return m
 
 
 def vessels():
-    """Holdups and pressures; nothing says yet what flows."""
+    """Build holdups and pressures; both flows are degrees of freedom."""
     m = pyo.ConcreteModel()
     m.fs = FlowsheetBlock(dynamic=True, time_set=[0, END], time_units=units.s)
     m.fs.vessel = pyo.Set(initialize=list(START))
-    m.fs.holdup = pyo.Var(m.fs.time, m.fs.vessel, initialize=lambda b, t, i: START[i] * CAPACITY, units=units.mol)
-    m.fs.accumulation = dae.DerivativeVar(m.fs.holdup, wrt=m.fs.time, initialize=0, units=FLOW)
+    m.fs.holdup = pyo.Var(
+        m.fs.time,
+        m.fs.vessel,
+        initialize=lambda b, t, i: START[i] * CAPACITY,
+        units=units.mol,
+    )
+    m.fs.accumulation = dae.DerivativeVar(
+        m.fs.holdup, wrt=m.fs.time, initialize=0, units=FLOW
+    )
     m.fs.forward = pyo.Var(m.fs.time, initialize=0, units=FLOW)
     m.fs.vented = pyo.Var(m.fs.time, initialize=0, units=FLOW)
     m.fs.holdup[0, :].fix()
@@ -56,14 +71,16 @@ def vessels():
 
     @m.fs.Constraint(m.fs.time, m.fs.vessel)
     def balance(fs, t, i):
-        inflow, outflow = (FEED * FLOW, fs.forward[t]) if i == 1 else (fs.forward[t], fs.vented[t])
+        inflow, outflow = (
+            (FEED * FLOW, fs.forward[t]) if i == 1 else (fs.forward[t], fs.vented[t])
+        )
         return fs.accumulation[t, i] == inflow - outflow
 
     return m
 
 
 def add_valves(m):
-    """The two lines that make the flowsheet switch."""
+    """Add the two valves."""
     fs, per_bar = m.fs, FLOW / units.bar
     fs.check = check_valve(
         fs.time,
@@ -78,21 +95,27 @@ def add_valves(m):
         opens=POPS,
         reseats=RESEATS,
         flow=fs.vented,
-        capacity=lambda fs, t: K_RELIEF * per_bar * (fs.pressure[t, 2] - FLARE * units.bar),
+        capacity=lambda fs, t: (
+            K_RELIEF * per_bar * (fs.pressure[t, 2] - FLARE * units.bar)
+        ),
     )
 
 
 def solve(nfe=80, ncp=3):
-    """March through time, then all elements at once; returns the model and the solver's results."""
+    """Simulate, then solve all elements at once; returns the model and the results."""
     m = build()
-    pyo.TransformationFactory('fesd.dcs').apply_to(m.fs, wrt=m.fs.time, memory=[m.fs.relief])
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m.fs, wrt=m.fs.time, nfe=nfe, ncp=ncp)
+    pyo.TransformationFactory('fesd.dcs').apply_to(
+        m.fs, wrt=m.fs.time, hysteresis=[m.fs.relief]
+    )
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(
+        m.fs, wrt=m.fs.time, nfe=nfe, ncp=ncp
+    )
     pyomo_fesd.simulate(m.fs)
     return m, pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=True)
 
 
 def reference():
-    """By scipy: times of all switches (s), and the pressures at the end (bar)."""
+    """Integrate with scipy: times of all switches (s), final pressures (bar)."""
 
     def rates(t, p, relieved):
         forward = max(0.0, K_CHECK * (p[0] - p[1]))
@@ -104,11 +127,23 @@ def reference():
         return gap
 
     catches_up = event(lambda t, p, relieved: p[0] - p[1])
-    limit = {False: event(lambda t, p, relieved: p[1] - POPS), True: event(lambda t, p, relieved: p[1] - RESEATS)}
+    limit = {
+        False: event(lambda t, p, relieved: p[1] - POPS),
+        True: event(lambda t, p, relieved: p[1] - RESEATS),
+    }
     t, p, relieved, found = 0.0, (START[1], START[2]), False, []
     while t < END:
         events = limit[relieved] if found else catches_up
-        piece = solve_ivp(rates, (t, END), p, 'DOP853', events=events, args=(relieved,), rtol=1e-13, atol=1e-13)
+        piece = solve_ivp(
+            rates,
+            (t, END),
+            p,
+            'DOP853',
+            events=events,
+            args=(relieved,),
+            rtol=1e-13,
+            atol=1e-13,
+        )
         t, p = piece.t[-1], piece.y[:, -1]
         if piece.status == 1:
             relieved = bool(found) and not relieved
@@ -117,7 +152,7 @@ def reference():
 
 
 def draw(m):
-    """Pressures with the thresholds, and flows."""
+    """Draw pressures with the thresholds, and flows."""
     table = pyomo_fesd.trajectory(m, m.fs.time)
     figure = Figure(figsize=(7, 6), layout='constrained')
     pressure, flow = axes = figure.subplots(2, 1, sharex=True)
@@ -147,7 +182,8 @@ def main():
         print(f'{switch}, {switch.time - exact:+.1e} s off')
     found = [pyo.value(m.fs.pressure[END, i]) for i in START]
     print(
-        f'Pressures at the end: {found[0]:.8f} and {found[1]:.8f} bar; errors {found[0] - end[0]:+.1e}, {found[1] - end[1]:+.1e}.'
+        f'Pressures at the end: {found[0]:.8f} and {found[1]:.8f} bar; errors '
+        f'{found[0] - end[0]:+.1e}, {found[1] - end[1]:+.1e}.'
     )
     draw(m)
     print(f'Pressures and flows over time: {PICTURE}')

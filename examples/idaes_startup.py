@@ -1,14 +1,21 @@
-"""Start-up of an IDAES reactor with as little unreacted lye in the product as possible: optimal control through an overflow.
+"""
+IDAES reactor start-up: optimal control through an overflow
+===========================================================
 
-    min int F c_NaOH dt      s.t.  int F dt >= 0.6 m3,     0 <= F perp crest - V >= 0,     0.5 <= u <= 4 L/s on each stage
+The reactor of ``idaes_overflow`` is started up with as little unreacted lye in the
+product as possible. The product is what leaves over the weir; lye that has not
+reacted by then is lost. The feed u is constant on each of three control stages. The
+time at which the overflow begins is a result: the element boundary that finds it
+moves while the feed is optimised. Independent shooting with scipy finds the same
+feeds. ::
 
-The plant is that of ``idaes_overflow``: mixer, reactor, weir.  What leaves over the weir is the product; what of the lye has not
-reacted by then is lost.  The feed u is constant on each of three stages.  When the overflow begins is a result: the
-element boundary that finds it moves while the feed is optimised.
+    min int F c_NaOH dt      s.t.  int F dt >= 0.6 m3
+    0 <= F perp crest - V >= 0,    0.5 <= u <= 4 L/s
 
-March through time with a brisk feed, which fills the vessel within the first stage, then all elements at once from there.  From
-the constant feed that just makes the product the search ends with the overflow at 200 s, on the boundary of two stages: a
-worse local minimum (``docs/limits.rst``).
+The solution starts from a simulation with a feed that fills the vessel within the
+first stage. From the constant feed that just makes the product, the search ends with
+the overflow at 200 s, on the boundary between two stages: a worse local minimum (see
+the page on limits).
 """
 
 from math import exp
@@ -45,10 +52,12 @@ units = pyo.units
 
 
 def build(stages=STAGES):
-    """The plant with its weir, the feed as a control, and what it is to do."""
+    """Build the plant with its weir, the feed as a control, and the objective."""
     m = plant([END * k / stages for k in range(stages + 1)])
     fs, flow = m.fs, units.m**3 / units.s
-    fs.weir = weir(fs.time, level=fs.cstr.volume, crest=CREST_VOLUME, flow=fs.cstr.outlet.flow_vol)
+    fs.weir = weir(
+        fs.time, level=fs.cstr.volume, crest=CREST_VOLUME, flow=fs.cstr.outlet.flow_vol
+    )
     fs.feed_rate = pyo.Var(fs.time, initialize=INFLOW, bounds=(LEAST, MOST), units=flow)
     streams = {'lye': fs.mixer.lye, 'ester': fs.mixer.ester}
 
@@ -71,7 +80,7 @@ def build(stages=STAGES):
 
 
 def begin(feed=BRISK, nfe=12, ncp=3):
-    """Discretise, guess, and simulate with a constant feed."""
+    """Discretise, initialise, and simulate with a constant feed."""
     m = build()
     pyo.TransformationFactory('fesd.finite_elements').apply_to(
         m.fs, wrt=m.fs.time, nfe=nfe, ncp=ncp, piecewise_constant=[m.fs.feed_rate]
@@ -100,7 +109,9 @@ def shoot(feeds):
     m = plant()
     cold, k0 = pyo.value(m.fs.props.temperature_ref), pyo.value(m.fs.kinetics.arrhenius)
     activation = pyo.value(m.fs.kinetics.energy_activation) / R
-    heating = -pyo.value(m.fs.kinetics.dh_rxn['R1'] / (m.fs.props.dens_mol * m.fs.props.cp_mol))  # m3 K/mol
+    heating = -pyo.value(
+        m.fs.kinetics.dh_rxn['R1'] / (m.fs.props.dens_mol * m.fs.props.cp_mol)
+    )  # m3 K/mol
 
     def rates(t, y, feed, full):
         volume, naoh, ester, heat, _ = y
@@ -108,46 +119,78 @@ def shoot(feeds):
         extent = k0 * exp(-activation / (cold + heat / volume)) * naoh * ester / volume
         lost = out * naoh / volume
         warm = feed * (FEED_TEMPERATURE - cold) + extent * heating - out * heat / volume
-        return feed - out, fed - extent - lost, fed - extent - out * ester / volume, warm, lost
+        return (
+            feed - out,
+            fed - extent - lost,
+            fed - extent - out * ester / volume,
+            warm,
+            lost,
+        )
 
     def crest(t, y, feed, full):
         return y[0] - CREST_VOLUME
 
     crest.terminal = True
-    y, full = [START_VOLUME, 0.0, 0.0, START_VOLUME * (START_TEMPERATURE - cold), 0.0], False
+    y, full = (
+        [START_VOLUME, 0.0, 0.0, START_VOLUME * (START_TEMPERATURE - cold), 0.0],
+        False,
+    )
     for k, feed in enumerate(feeds):
         t, end = END * k / len(feeds), END * (k + 1) / len(feeds)
         while t < end:
             event = None if full else crest
-            piece = solve_ivp(rates, (t, end), y, 'Radau', events=event, args=(feed, full), rtol=1e-9, atol=1e-11)
+            piece = solve_ivp(
+                rates,
+                (t, end),
+                y,
+                'Radau',
+                events=event,
+                args=(feed, full),
+                rtol=1e-9,
+                atol=1e-11,
+            )
             t, y = piece.t[-1], piece.y[:, -1]
             full = full or piece.status == 1
     return y[4]
 
 
 def reference():
-    """The best feeds by shooting, and what they lose; the product needs the sum of the feeds."""
+    """Best feeds and lye lost by shooting; the product fixes the sum of feeds."""
     total = STAGES * (PRODUCT + CREST_VOLUME - START_VOLUME) / END
 
     def of_two(late):
         return shoot([total - sum(late) * 1e-3, *(1e-3 * feed for feed in late)])
 
-    found = minimize(of_two, [1.4, 1.5], method='Nelder-Mead', options=dict(xatol=1e-4, fatol=1e-9))
+    found = minimize(
+        of_two, [1.4, 1.5], method='Nelder-Mead', options=dict(xatol=1e-4, fatol=1e-9)
+    )
     return [total - sum(found.x) * 1e-3, *(1e-3 * found.x)], found.fun
 
 
 def draw(m, constant):
-    """Feed and outflow, volume, lye in the product; dashed with the constant feed."""
+    """Draw feed, outflow, volume and lye; dashed with the constant feed."""
     figure = Figure(figsize=(7, 7), layout='constrained')
     flow, volume, naoh = axes = figure.subplots(3, 1, sharex=True)
     for table, style in ((constant, '--'), (pyomo_fesd.trajectory(m, m.fs.time), '-')):
-        flow.plot(1e3 * table['fs.feed_rate'], 'C0' + style, drawstyle='steps-pre', label='feed' if style == '-' else None)
-        flow.plot(1e3 * table[OUTFLOW], 'C1' + style, drawstyle='steps-pre', label='product' if style == '-' else None)
+        flow.plot(
+            1e3 * table['fs.feed_rate'],
+            'C0' + style,
+            drawstyle='steps-pre',
+            label='feed' if style == '-' else None,
+        )
+        flow.plot(
+            1e3 * table[OUTFLOW],
+            'C1' + style,
+            drawstyle='steps-pre',
+            label='product' if style == '-' else None,
+        )
         volume.plot(table[VOLUME], 'C2' + style)
         naoh.plot(table[NAOH], 'C3' + style)
     flow.legend()
     naoh.set_xlabel('time (s)')
-    for axis, label in zip(axes, ('flow (L/s)', 'volume (m³)', 'lye in the product (mol/m³)')):
+    for axis, label in zip(
+        axes, ('flow (L/s)', 'volume (m³)', 'lye in the product (mol/m³)')
+    ):
         axis.set_ylabel(label)
         for switch in pyomo_fesd.switches(m, m.fs.time):
             axis.axvline(switch.time, color='grey', linestyle=':')
@@ -155,15 +198,29 @@ def draw(m, constant):
 
 
 def main():
-    """Simulate, optimise, say what was found, draw."""
+    """Simulate, optimise, print the answer, draw."""
     plain, m = begin(INFLOW), begin()
-    constant, lost = pyomo_fesd.trajectory(plain, plain.fs.time), pyo.value(plain.fs.lost)
+    constant, lost = (
+        pyomo_fesd.trajectory(plain, plain.fs.time),
+        pyo.value(plain.fs.lost),
+    )
     results = solve(m)
     print(f'mpec_hybrid: {results.solver.reason}.')
-    print(f'Lye lost: {pyo.value(m.fs.lost):.6f} mol, with a constant feed of {1e3 * INFLOW:g} L/s {lost:.6f} mol.')
-    print('Feed: ' + ', '.join(f'{1e3 * feed:.6f}' for feed in feeds(m)) + f' L/s; product {pyo.value(m.fs.product):.6f} m3.')
+    print(
+        f'Lye lost: {pyo.value(m.fs.lost):.6f} mol, with a constant feed of '
+        f'{1e3 * INFLOW:g} L/s {lost:.6f} mol.'
+    )
+    print(
+        'Feed: '
+        + ', '.join(f'{1e3 * feed:.6f}' for feed in feeds(m))
+        + f' L/s; product {pyo.value(m.fs.product):.6f} m3.'
+    )
     best, least = reference()
-    print(f'By shooting: {least:.6f} mol with ' + ', '.join(f'{1e3 * feed:.4f}' for feed in best) + ' L/s.')
+    print(
+        f'By shooting: {least:.6f} mol with '
+        + ', '.join(f'{1e3 * feed:.4f}' for feed in best)
+        + ' L/s.'
+    )
     for switch in pyomo_fesd.switches(m, m.fs.time):
         print(f'The overflow begins at {switch.time:.6f} s.')
     draw(m, constant)

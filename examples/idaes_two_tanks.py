@@ -1,12 +1,18 @@
-"""Two tanks with overflow weirs: the IDAES flowsheet of ``idaes_overflow``, one vessel longer.
+"""
+IDAES: two tanks with overflow weirs
+====================================
 
-    lye, ester --> Mixer --> reactor ==weir==> second tank ==weir==>       NaOH + EtOAc -> NaOAc + EtOH, in both
+The IDAES flowsheet of ``idaes_overflow`` with a second vessel. A weir is one line,
+``pyomo_fesd.units.weir``: 0 <= F perp crest - volume >= 0. It holds the volume at the
+crest as long as there is inflow. It needs no weir law, no capacity and no mode, and
+adds no variable and no equation to the flowsheet. The second tank gets nothing before
+the first is full: 0.6 m3 at 2e-3 m3/s take exactly 300 s. Then 0.3 m3 are left in the
+second, which overflows at exactly 450 s. An ``Integral`` counts the outflow, and the
+sodium balance closes. ::
 
-A weir is one line, ``pyomo_fesd.units.weir``: 0 <= F perp crest - volume >= 0.  It holds the volume at the crest for as long as
-something flows in; no weir law, no capacity, no mode is needed, and it adds no variable and no equation to the flowsheet.
+    lye, ester --> Mixer --> reactor ==weir==> second tank ==weir==>
 
-Nothing reaches the second tank before the first is full: with 0.6 m3 to fill at 2e-3 m3/s at 300 s.  Then 0.3 m3 are left in the
-second, so that it overflows at 450 s.  What leaves is counted by an ``Integral``: sodium is neither made nor lost.
+    NaOH + EtOAc -> NaOAc + EtOH in both vessels
 """
 
 from collections import namedtuple
@@ -44,7 +50,10 @@ from pyomo_fesd.units import scale_by_values, weir
 SECOND_START, SECOND_CREST = 0.2, 0.5  # m3
 SECOND_TIME = OVERFLOW_TIME + (SECOND_CREST - SECOND_START) / INFLOW  # s, exact
 VOLUMES = ('fs.cstr.control_volume.volume', 'fs.second.control_volume.volume')
-OUTFLOWS = ('fs.cstr.control_volume.properties_out.flow_vol', 'fs.second.control_volume.properties_out.flow_vol')
+OUTFLOWS = (
+    'fs.cstr.control_volume.properties_out.flow_vol',
+    'fs.second.control_volume.properties_out.flow_vol',
+)
 NAOH = 'fs.second.control_volume.properties_out.conc_mol_comp[NaOH]'
 TEMPERATURE = 'fs.second.control_volume.properties_out.temperature'
 SODIUM = ('NaOH', 'SodiumAcetate')
@@ -54,14 +63,14 @@ Reference = namedtuple('Reference', 'times naoh temperature')
 
 
 def build():
-    """Both vessels with their weirs; ``specify_both`` gives the inputs once it is discretised."""
+    """Build both vessels with their weirs; ``specify_both`` fixes the inputs later."""
     m = two_vessels()
     add_weirs(m)
     return m
 
 
 def two_vessels():
-    """The flowsheet of one vessel and a second one; nothing says yet how much leaves them."""
+    """Build both vessels; both outflows are degrees of freedom."""
     m = plant()
     m.fs.second = CSTR(
         property_package=m.fs.props,
@@ -82,10 +91,17 @@ def two_vessels():
 
 
 def add_weirs(m):
-    """The two lines that make the flowsheet switch."""
+    """Add the two weirs."""
     time = m.fs.time
-    m.fs.weir = weir(time, level=m.fs.cstr.volume, crest=CREST_VOLUME, flow=m.fs.cstr.outlet.flow_vol)
-    m.fs.second_weir = weir(time, level=m.fs.second.volume, crest=SECOND_CREST, flow=m.fs.second.outlet.flow_vol)
+    m.fs.weir = weir(
+        time, level=m.fs.cstr.volume, crest=CREST_VOLUME, flow=m.fs.cstr.outlet.flow_vol
+    )
+    m.fs.second_weir = weir(
+        time,
+        level=m.fs.second.volume,
+        crest=SECOND_CREST,
+        flow=m.fs.second.outlet.flow_vol,
+    )
 
 
 def specify_both(m):
@@ -100,14 +116,26 @@ def specify_both(m):
 
 
 def initialise(m):
-    """A first guess: both vessels fill and then stay full."""
-    feed = dict.fromkeys(SOLUTES, 0.0) | dict(H2O=m.fs.props.dens_mol, NaOH=FEED_CONC / 2, EthylAcetate=FEED_CONC / 2)
-    passed = dict.fromkeys(SOLUTES, FEED_CONC / 2) | dict(H2O=m.fs.props.dens_mol, NaOH=1.0, EthylAcetate=1.0)
+    """Initial guess: both vessels fill and then stay full."""
+    feed = dict.fromkeys(SOLUTES, 0.0) | dict(
+        H2O=m.fs.props.dens_mol, NaOH=FEED_CONC / 2, EthylAcetate=FEED_CONC / 2
+    )
+    passed = dict.fromkeys(SOLUTES, FEED_CONC / 2) | dict(
+        H2O=m.fs.props.dens_mol, NaOH=1.0, EthylAcetate=1.0
+    )
     times = list(m.fs.time)
     for t in times:
         guess_state(m.fs.mixer.mixed_state[t], INFLOW, feed)
-    guess_reactor(m.fs.cstr, {t: min(START_VOLUME + INFLOW * t, CREST_VOLUME) for t in times}, INFLOW, feed)
-    late = {t: min(SECOND_START + INFLOW * max(0, t - OVERFLOW_TIME), SECOND_CREST) for t in times}
+    guess_reactor(
+        m.fs.cstr,
+        {t: min(START_VOLUME + INFLOW * t, CREST_VOLUME) for t in times},
+        INFLOW,
+        feed,
+    )
+    late = {
+        t: min(SECOND_START + INFLOW * max(0, t - OVERFLOW_TIME), SECOND_CREST)
+        for t in times
+    }
     guess_reactor(m.fs.second, late, INFLOW / 2, passed)
     specify_both(m)
     for vessel, fills_until in ((m.fs.cstr, OVERFLOW_TIME), (m.fs.second, SECOND_TIME)):
@@ -117,9 +145,11 @@ def initialise(m):
 
 
 def moving_grid(nfe=24, ncp=2):
-    """Elements whose boundaries find both times: guess, scale, march through time, then all elements at once from there."""
+    """Discretise, initialise, scale, simulate, solve; returns model and results."""
     m = build()
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m.fs, wrt=m.fs.time, nfe=nfe, ncp=ncp)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(
+        m.fs, wrt=m.fs.time, nfe=nfe, ncp=ncp
+    )
     initialise(m)
     scale_by_values(m)
     pyomo_fesd.simulate(m.fs)
@@ -134,29 +164,53 @@ def solve(m, **options):
 
 
 def balance(m):
-    """How much sodium (mol) the flowsheet has made: contents at the end + left - contents at first - fed."""
+    """Sodium balance (mol): final contents + outflow - initial contents - feed."""
     ends = {t: sum(holdup(m, t)) for t in (m.fs.time.first(), m.fs.time.last())}
-    return ends[m.fs.time.last()] + pyo.value(m.fs.sodium_out) - ends[m.fs.time.first()] - FED
+    return (
+        ends[m.fs.time.last()]
+        + pyo.value(m.fs.sodium_out)
+        - ends[m.fs.time.first()]
+        - FED
+    )
 
 
 def holdup(m, t):
     """Sodium (mol) in each vessel."""
     for vessel in (m.fs.cstr, m.fs.second):
-        yield sum(pyo.value(vessel.control_volume.material_holdup[t, 'Liq', j]) for j in SODIUM)
+        yield sum(
+            pyo.value(vessel.control_volume.material_holdup[t, 'Liq', j])
+            for j in SODIUM
+        )
 
 
 def reference():
-    """The same balances by scipy, from one located overflow to the next: both times (s), NaOH (mol/m3) and temperature (K)."""
+    """Integrate the same balances with scipy between located events."""
     m = plant()
     cold = pyo.value(m.fs.props.temperature_ref)
-    k0, activation_energy = pyo.value(m.fs.kinetics.arrhenius), pyo.value(m.fs.kinetics.energy_activation)
-    heating = -pyo.value(m.fs.kinetics.dh_rxn['R1'] / (m.fs.props.dens_mol * m.fs.props.cp_mol))  # m3 K/mol
-    feed = (INFLOW, INFLOW / 2 * FEED_CONC, INFLOW / 2 * FEED_CONC, INFLOW * (FEED_TEMPERATURE - cold))
+    k0, activation_energy = (
+        pyo.value(m.fs.kinetics.arrhenius),
+        pyo.value(m.fs.kinetics.energy_activation),
+    )
+    heating = -pyo.value(
+        m.fs.kinetics.dh_rxn['R1'] / (m.fs.props.dens_mol * m.fs.props.cp_mol)
+    )  # m3 K/mol
+    feed = (
+        INFLOW,
+        INFLOW / 2 * FEED_CONC,
+        INFLOW / 2 * FEED_CONC,
+        INFLOW * (FEED_TEMPERATURE - cold),
+    )
 
     def vessel(y, inflow, out):
-        """Rates of volume (m3), NaOH, ester (mol) and V (T - T_ref) (m3 K), and the outflow of each."""
+        """Rates and outflows of volume, NaOH, ester and V (T - T_ref) (m3, mol, K)."""
         volume, naoh, ester, heat = y
-        extent = k0 * exp(-activation_energy / R / (cold + heat / volume)) * naoh * ester / volume
+        extent = (
+            k0
+            * exp(-activation_energy / R / (cold + heat / volume))
+            * naoh
+            * ester
+            / volume
+        )
         made = (0.0, -extent, -extent, extent * heating)
         outflow = [out * part / volume for part in y]
         return [i + g - o for i, g, o in zip(inflow, made, outflow)], outflow
@@ -176,26 +230,40 @@ def reference():
         return [volume, 0.0, 0.0, volume * (START_TEMPERATURE - cold)]
 
     t, y, times = 0.0, start(START_VOLUME) + start(SECOND_START), []
-    for outs, event in (((0, 0), full(0, CREST_VOLUME)), ((INFLOW, 0), full(4, SECOND_CREST)), ((INFLOW, INFLOW), None)):
-        piece = solve_ivp(rates, (t, END), y, 'Radau', events=event, args=outs, rtol=1e-11, atol=1e-12)
+    for outs, event in (
+        ((0, 0), full(0, CREST_VOLUME)),
+        ((INFLOW, 0), full(4, SECOND_CREST)),
+        ((INFLOW, INFLOW), None),
+    ):
+        piece = solve_ivp(
+            rates, (t, END), y, 'Radau', events=event, args=outs, rtol=1e-11, atol=1e-12
+        )
         t, y = piece.t[-1], piece.y[:, -1]
         times.append(t)
     return Reference(times[:2], y[5] / y[4], cold + y[7] / y[4])
 
 
 def draw(table, spiked):
-    """Volumes, outflows and NaOH in the product over time (s); dashed, the outflow of the reactor on fixed elements."""
+    """Draw volumes, outflows and NaOH; dashed: outflow on fixed elements."""
     figure = Figure(figsize=(7, 8), layout='constrained')
     volume, outflow, naoh = axes = figure.subplots(3, 1, sharex=True)
     for name, column, flow in zip(('reactor', 'second tank'), VOLUMES, OUTFLOWS):
         volume.plot(table[column], label=name)
-        outflow.plot(1e3 * table[flow], marker='.', drawstyle='steps-pre', label=name)  # it jumps
-    outflow.plot(1e3 * spiked[OUTFLOWS[0]], 'k--', linewidth=0.8, drawstyle='steps-pre', label='reactor, fixed elements')
+        outflow.plot(1e3 * table[flow], marker='.', drawstyle='steps-pre', label=name)
+    outflow.plot(
+        1e3 * spiked[OUTFLOWS[0]],
+        'k--',
+        linewidth=0.8,
+        drawstyle='steps-pre',
+        label='reactor, fixed elements',
+    )
     naoh.plot(table[NAOH], color='C2')
     volume.legend()
     outflow.legend()
     naoh.set_xlabel('time (s)')
-    for axis, label in zip(axes, ('volume (m³)', 'outflow (L/s)', 'NaOH in the product (mol/m³)')):
+    for axis, label in zip(
+        axes, ('volume (m³)', 'outflow (L/s)', 'NaOH in the product (mol/m³)')
+    ):
         axis.set_ylabel(label)
         for time in (OVERFLOW_TIME, SECOND_TIME):
             axis.axvline(time, color='grey', linestyle=':')
@@ -203,18 +271,32 @@ def draw(table, spiked):
 
 
 def main():
-    """Solve, say what was found, and what fixed elements make of the first vessel; draw."""
+    """Solve, print the answer beside that of fixed elements, draw."""
     m, results = moving_grid()
     table, exact = pyomo_fesd.trajectory(m, m.fs.time), reference()
     print(f'mpec_hybrid: {results.solver.reason}.')
-    for switch, time, name in zip(pyomo_fesd.switches(m, m.fs.time), exact.times, ('reactor', 'second tank')):
-        print(f'The {name} overflows from {switch.time:.9f} s on, {switch.time - time:+.1e} s off an event-located integration.')
-    print(f'The product ends at {table[TEMPERATURE].iloc[-1]:.6f} K, {table[TEMPERATURE].iloc[-1] - exact.temperature:+.1e} K off.')
+    for switch, time, name in zip(
+        pyomo_fesd.switches(m, m.fs.time), exact.times, ('reactor', 'second tank')
+    ):
+        print(
+            f'The {name} overflows from {switch.time:.9f} s on, '
+            f'{switch.time - time:+.1e} s off an event-located integration.'
+        )
+    print(
+        f'The product ends at {table[TEMPERATURE].iloc[-1]:.6f} K, '
+        f'{table[TEMPERATURE].iloc[-1] - exact.temperature:+.1e} K off.'
+    )
     peak = max(table[flow].max() for flow in OUTFLOWS)
-    print(f'The largest outflow is {peak:.12f} m3/s; {balance(m):+.1e} mol of sodium of {FED:g} mol came from nowhere.')
-    fixed = fixed_grid(15, 2)  # of the one vessel
+    print(
+        f'The largest outflow is {peak:.12f} m3/s; the sodium balance closes '
+        f'to {balance(m):+.1e} mol of {FED:g} mol.'
+    )
+    fixed = fixed_grid(15, 2)  # the first vessel only
     spiked = pyomo_fesd.trajectory(fixed, fixed.fs.time)
-    print(f'On fixed elements the largest outflow of the reactor is {spiked[OUTFLOWS[0]].max():.6f} m3/s.')
+    print(
+        'On fixed elements the largest outflow of the reactor is '
+        f'{spiked[OUTFLOWS[0]].max():.6f} m3/s.'
+    )
     draw(table, spiked)
     print(f'Volumes, outflows and product over time: {PICTURE}')
 

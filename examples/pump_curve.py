@@ -1,12 +1,20 @@
-"""Pump curve: a centrifugal pump fills a water tower; head and efficiency stand in the maker's data sheet as tables.
+"""
+Pump curve: tables in an implicit equation
+==========================================
 
-    A dh/dt = q,        head(q) = LIFT + h + FRICTION q^2,        power = rho g q head(q) / efficiency(q)
+A centrifugal pump fills a water tower. The data sheet gives head and efficiency as
+tables over the flow. As the water rises the flow falls, and the operating point
+passes the breakpoints at 40, 30 and 20 m3/h. The flow is given by an implicit
+equation that contains the table. Both tables have the same breakpoints, so they share
+their nonsmooth terms: four at each time. Between two breakpoints head(q) = a + m q,
+hence dt = A dh/q = A (m - 2 FRICTION q)/q dq, and the exact times follow in closed
+form. ::
 
-The higher the water stands, the less flows: the operating point wanders along the curve and passes breakpoints of the tables at
-40, 30 and 20 m3/h.  The flow is given by an implicit equation that contains the table.  Both tables have the same breakpoints,
-so they share their kinks: four a time for the two.
+    A dh/dt = q
+    head(q) = LIFT + h + FRICTION q^2
+    power = rho g q head(q) / efficiency(q)
 
-Between two breakpoints head(q) = a + m q, so  dt = A dh/q = A (m - 2 FRICTION q)/q dq: the times are known in closed form.
+Units: m, h, kW.
 """
 
 from math import log
@@ -26,13 +34,13 @@ EFFICIENCY = (0.05, 0.35, 0.56, 0.66, 0.67, 0.58)
 AREA = 10.0  # m2
 LIFT = 14.0  # m
 FRICTION = 0.002  # m/(m3/h)^2
-HYDRAULIC = 9.81 / 3600  # kWh for each m3 lifted by one m: rho g
+HYDRAULIC = 9.81 / 3600  # rho g in kWh/(m3 m)
 HORIZON = 5.0  # h
 PICTURE = 'pump_curve.png'
 
 
 def build():
-    """The tower with its pump, the tables as PiecewiseLinearFunctions."""
+    """Build the tower with its pump; the tables are PiecewiseLinearFunctions."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, HORIZON))
     m.h = pyo.Var(m.t, initialize=0.0, bounds=(0, 20))  # m
@@ -68,7 +76,7 @@ def solve(nfe=12, ncp=3):
 
 
 def exact():
-    """Times (h) at which the flow falls to 40, 30 and 20 m3/h, level (m) at the end, and energy (kWh)."""
+    """Exact times (h) of the three breakpoints, final level (m), energy (kWh)."""
 
     def level(q):
         return np.interp(q, FLOW, HEAD) - LIFT - FRICTION * q**2
@@ -78,32 +86,55 @@ def exact():
         return (HEAD[k + 1] - HEAD[k]) / (FLOW[k + 1] - FLOW[k])
 
     def duration(before, after):
-        return AREA * (slope(before) * log(after / before) - 2 * FRICTION * (after - before))
+        return AREA * (
+            slope(before) * log(after / before) - 2 * FRICTION * (after - before)
+        )
 
     def consumption(q):
-        return HYDRAULIC * AREA * (slope(q) - 2 * FRICTION * q) * np.interp(q, FLOW, HEAD) / np.interp(q, FLOW, EFFICIENCY)
+        return (
+            HYDRAULIC
+            * AREA
+            * (slope(q) - 2 * FRICTION * q)
+            * np.interp(q, FLOW, HEAD)
+            / np.interp(q, FLOW, EFFICIENCY)
+        )
 
     corners = [brentq(level, 40.0, 50.0, xtol=1e-14), 40.0, 30.0, 20.0]
     times = np.cumsum([duration(*ends) for ends in zip(corners, corners[1:])])
-    corners.append(brentq(lambda q: times[-1] + duration(20.0, q) - HORIZON, 10.0, 20.0, xtol=1e-14))
-    energy = sum(quad(consumption, *ends, epsabs=1e-13)[0] for ends in zip(corners, corners[1:]))
+    corners.append(
+        brentq(
+            lambda q: times[-1] + duration(20.0, q) - HORIZON, 10.0, 20.0, xtol=1e-14
+        )
+    )
+    energy = sum(
+        quad(consumption, *ends, epsabs=1e-13)[0] for ends in zip(corners, corners[1:])
+    )
     return list(times), level(corners[-1]), energy
 
 
 def found(m):
-    """The same as ``exact`` lists, as solved."""
-    return [s.time for s in pyomo_fesd.switches(m)], m.h[HORIZON].value, pyo.value(m.energy)
+    """Values of the solved model, in the order of ``exact``."""
+    return (
+        [s.time for s in pyomo_fesd.switches(m)],
+        m.h[HORIZON].value,
+        pyo.value(m.energy),
+    )
 
 
 def draw(m):
-    """Level, flow and power with elements and switches."""
-    figure = pyomo_fesd.plot(m, m.t, ['h', 'q', 'power'], units={'h': 'level (m)', 'q': 'flow (m3/h)', 'power': 'power (kW)'})
+    """Draw level, flow and power with elements and switches."""
+    figure = pyomo_fesd.plot(
+        m,
+        m.t,
+        ['h', 'q', 'power'],
+        units={'h': 'level (m)', 'q': 'flow (m3/h)', 'power': 'power (kW)'},
+    )
     figure.axes[-1].set_xlabel('time (h)')
     figure.savefig(PICTURE, dpi=150)
 
 
 def main():
-    """Solve, print what is found beside the exact values, draw."""
+    """Solve, print the answer beside the exact values, draw."""
     m, _ = solve()
     (_, level, energy), (exact_times, exact_level, exact_energy) = found(m), exact()
     for switch, time in zip(pyomo_fesd.switches(m), exact_times):

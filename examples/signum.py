@@ -1,16 +1,22 @@
-"""Signum: the smallest system with a switch, solved to machine precision with ten elements.
+"""
+Signum: the smallest system with a switch
+=========================================
+
+One state crosses one boundary. Ten elements give the switching time and the end state
+to machine precision: both pieces of the solution are straight lines, so collocation
+is exact on every element that holds only one of them, and the element boundary lies
+on the switch. On a fixed grid the error would be of the order of an element's length,
+whatever the order of the collocation. ::
 
     dx/dt = 2 - sgn(x),   x(0) = -2,   0 <= t <= 2
 
     below (x <= 0):  dx/dt = 3        above (x >= 0):  dx/dt = 1
 
-x reaches zero at t_s = 2/3 and ends at x(2) = 2 - t_s = 4/3.  Both pieces are straight lines, so collocation is exact on every
-element that holds only one of them: what error is left is that of the switching time.  On a fixed grid it would be of the
-order of an element's length, whatever the order of the collocation.
+The exact solution reaches zero at t_s = 2/3 and ends at x(2) = 2 - t_s = 4/3. The
+multiplier nu of the mode below is 1 before the switch and 0 after it, so that dx/dt =
+3 nu + (1 - nu) = 1 + 2 nu. All quantities are dimensionless.
 
-nu, the multiplier of the mode below, is 1 before the switch and 0 after it:  dx/dt = 3 nu + (1 - nu) = 1 + 2 nu.
-
-Source: paper, eq. (21) and Fig. 2.  Nothing here has a unit.
+Source: paper, eq. (21) and Fig. 2.
 """
 
 import pyomo.dae as dae
@@ -25,7 +31,7 @@ PICTURE = 'signum.png'
 
 
 def build():
-    """Two modes over a continuous time, as in eq. (21a) and (21b); nothing is left free, so there is no objective."""
+    """Build the two modes; no variable is free, so there is no objective."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, END))
     m.x = pyo.Var(m.t, initialize=-2)
@@ -50,20 +56,27 @@ def build():
 
 
 def solve(m):
-    """The three pieces in a row, elements by the 4th order Gauss scheme of the paper; returns the solver's results."""
+    """Transform with a Gauss scheme of order 4 and solve; returns the results."""
     pyo.TransformationFactory('fesd.dcs').apply_to(m)
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, wrt=m.t, nfe=ELEMENTS, ncp=2, scheme='LAGRANGE-LEGENDRE')
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(
+        m, wrt=m.t, nfe=ELEMENTS, ncp=2, scheme='LAGRANGE-LEGENDRE'
+    )
     return pyo.SolverFactory('mpec_hybrid').solve(m)
 
 
 def draw(m):
-    """x and nu over time, element boundaries as grey lines and the switch as a dashed line (paper, Fig. 2)."""
-    figure = pyomo_fesd.plot(m, m.t, ['x', 'sgn: below'], units={'x': 'state x', 'sgn: below': 'multiplier ν (mode below)'})
+    """Draw x and nu with element boundaries and the switch (paper, Fig. 2)."""
+    figure = pyomo_fesd.plot(
+        m,
+        m.t,
+        ['x', 'sgn: below'],
+        units={'x': 'state x', 'sgn: below': 'multiplier ν (mode below)'},
+    )
     figure.savefig(PICTURE, dpi=150)
 
 
 def main():
-    """Solve, say in words what was found, draw."""
+    """Solve, print the answer with its errors, draw."""
     m = build()
     results = solve(m)
     (switch,) = pyomo_fesd.switches(m, m.t)
@@ -72,9 +85,15 @@ def main():
     first, last = elements['length'].iloc[[0, -1]]
     work = f'{results.solver.nlps} NLPs with {results.solver.nlp_iterations} iterations'
     print(f'mpec_hybrid: {results.solver.reason}; {work}.')
-    print(f'x goes from {switch.before} to {switch.after} zero at t = {switch.time:.12f}, {switch.time - SWITCH:+.1e} off 2/3.')
+    print(
+        f'x goes from {switch.before} to {switch.after} zero '
+        f'at t = {switch.time:.12f}, {switch.time - SWITCH:+.1e} off 2/3.'
+    )
     print(f'x(2) = {m.x[END].value:.12f}, {m.x[END].value - FINAL:+.1e} off 4/3.')
-    print(f'Before the switch lie {before} elements of length {first:.6f}, after it {ELEMENTS - before} of {last:.6f}.')
+    print(
+        f'There are {before} elements of length {first:.6f} before the switch '
+        f'and {ELEMENTS - before} of length {last:.6f} after it.'
+    )
     draw(m)
     print(f'x and nu over time: {PICTURE}')
 

@@ -1,13 +1,17 @@
-"""Thermostat with hysteresis: the heater goes off at 20 degrees and on again at 18; between the two the last mode goes on.
+"""
+Thermostat: two modes with hysteresis
+=====================================
 
-    heating (up to 20):   dy/dt = 10 - y/5          cooling (down to 18):   dy/dt = -y/5
+The heater of a room is switched off at 20 degrees and on again at 18. Between the two
+temperatures the regions of the modes overlap and the previous mode continues, so the
+Disjunction is named in ``hysteresis``. Each mode is an exponential, so every switching
+time is known in closed form: from 15 degrees with the heater on, it is switched off
+after 5 log(35/30) hours; then the room cools for 5 log(20/18) and heats for 5
+log(32/30) hours, again and again. ::
 
-The regions overlap where 18 <= y <= 20, so a Disjunction alone does not say what happens there: ``memory`` does.  Each mode is an
-exponential, hence from 15 degrees with the heater on
+    heating (up to 20):   dy/dt = 10 - y/5        cooling (down to 18):   dy/dt = -y/5
 
-    off after 5 log(35/30),   then it cools for 5 log(20/18) and heats for 5 log(32/30), again and again.
-
-Time in hours, temperature in degrees.
+Time in hours, temperature in degrees Celsius.
 """
 
 from itertools import accumulate, cycle, takewhile
@@ -25,13 +29,13 @@ PICTURE = 'thermostat.png'
 
 
 def switching_times(horizon=HORIZON):
-    """When the heater goes off, on, off, ... up to the horizon."""
-    stretches = cycle([COOLS, HEATS])
-    return list(takewhile(lambda t: t < horizon, accumulate(stretches, initial=FIRST)))
+    """Exact times at which the heater goes off, on, off, ..."""
+    durations = cycle([COOLS, HEATS])
+    return list(takewhile(lambda t: t < horizon, accumulate(durations, initial=FIRST)))
 
 
 def room(horizon=HORIZON):
-    """A temperature over time."""
+    """Declare the temperature over time."""
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(bounds=(0, horizon))
     m.y = pyo.Var(m.t, initialize=START)
@@ -41,7 +45,7 @@ def room(horizon=HORIZON):
 
 
 def add_heater(m):
-    """Two modes with overlapping regions, heating first."""
+    """Add two modes with overlapping regions; heating is the first one."""
 
     @m.Disjunct(m.t)
     def heating(d, t):
@@ -64,26 +68,33 @@ def add_heater(m):
 
 
 def build(horizon=HORIZON):
-    """The room with its heater."""
+    """Build the room with its heater."""
     return add_heater(room(horizon))
 
 
 def transform(m, nfe=15, ncp=3, scheme='LAGRANGE-RADAU'):
-    """The two transformations in a row."""
-    pyo.TransformationFactory('fesd.dcs').apply_to(m, memory=[m.relay])
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=nfe, ncp=ncp, scheme=scheme)
+    """Apply both transformations."""
+    pyo.TransformationFactory('fesd.dcs').apply_to(m, hysteresis=[m.relay])
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(
+        m, nfe=nfe, ncp=ncp, scheme=scheme
+    )
     return m
 
 
 def main():
-    """March through the elements, then solve all of them at once from there; say what was found, draw."""
+    """Simulate, solve all elements at once from there, print the answer, draw."""
     m = transform(build())
     pyomo_fesd.simulate(m)
     results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=True)
     print(f'mpec_hybrid: {results.solver.reason}; {results.solver.nlps} NLPs.')
     for switch, exact in zip(pyomo_fesd.switches(m), switching_times()):
         print(f'{switch}, {switch.time - exact:+.1e} off')
-    figure = pyomo_fesd.plot(m, m.t, ['y', 'relay: heating'], units={'y': 'temperature y (°C)', 'relay: heating': 'heater on'})
+    figure = pyomo_fesd.plot(
+        m,
+        m.t,
+        ['y', 'relay: heating'],
+        units={'y': 'temperature y (°C)', 'relay: heating': 'heater on'},
+    )
     for threshold in (LOW, HIGH):
         figure.axes[0].axhline(threshold, color='C3', linewidth=0.6)
     figure.savefig(PICTURE, dpi=150)

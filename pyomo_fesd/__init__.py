@@ -6,25 +6,18 @@ Importing this registers ``fesd.dcs``, ``fesd.smooth_to_complementarity``, ``fes
 
 import pyomo.environ  # noqa: F401  registers Pyomo's own plug-ins first
 
-from pyomo_fesd import casadi_ipopt as _casadi_ipopt  # noqa: F401
+from pyomo_fesd import dcs as _dcs  # noqa: F401
+from pyomo_fesd import finite_elements as _finite_elements  # noqa: F401
+from pyomo_fesd import smoothing as _smoothing  # noqa: F401
 from pyomo_fesd import units
-from pyomo_fesd.accuracy.refine import refine
-from pyomo_fesd.clock import clock
-from pyomo_fesd.dcs import transformation as _dcs  # noqa: F401
-from pyomo_fesd.elements import transformation as _elements  # noqa: F401
-from pyomo_fesd.errors import FesdError
-from pyomo_fesd.kinks import transformation as _kinks  # noqa: F401
-from pyomo_fesd.kinks.functions import absolute, clip, maximum, minimum, positive_part
-from pyomo_fesd.march.simulate import simulate
-from pyomo_fesd.plot import plot
-from pyomo_fesd.projected import projection
-from pyomo_fesd.report import report
-from pyomo_fesd.solver import certify
-from pyomo_fesd.state_jump import state_jump
-from pyomo_fesd.structure import structure
-from pyomo_fesd.trajectory import element_lengths, physical_time, switches, trajectory
+from pyomo_fesd.analysis import report, structure
+from pyomo_fesd.core import FesdError, __version__
+from pyomo_fesd.modeling import absolute, clip, clock, maximum, minimum, positive_part, projection, signal, state_jump
+from pyomo_fesd.refinement import refine
+from pyomo_fesd.results import element_lengths, physical_time, plot, switches, trajectory
+from pyomo_fesd.simulation import simulate
+from pyomo_fesd.solvers import certify
 
-__version__ = '0.1.0'
 __all__ = [
     'FesdError',
     'absolute',
@@ -40,6 +33,7 @@ __all__ = [
     'projection',
     'refine',
     'report',
+    'signal',
     'simulate',
     'state_jump',
     'structure',

@@ -15,7 +15,7 @@ from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
 import pyomo_fesd  # noqa: F401  registers the transformations
-from pyomo_fesd.complementarity import read
+from pyomo_fesd.core.complementarity import read_complementarity
 
 EVERYWHERE = (pyo.Block, Disjunct)
 
@@ -284,7 +284,7 @@ def values_of_generated(m):
         v.set_value(random.Random(v.name).uniform(0.5, 1.5), skip_validation=True)
     values = {name: residual(c) for name, c in generated(m, pyo.Constraint).items()}
     for name, condition in generated(m, Complementarity).items():
-        values[name, 'G'], values[name, 'H'] = (pyo.value(side) for side in read(condition))
+        values[name, 'G'], values[name, 'H'] = (pyo.value(side) for side in read_complementarity(condition))
     return values
 
 
@@ -312,14 +312,17 @@ def form_of(disjunction):
     return block, () if index is None else index if isinstance(index, tuple) else (index,)
 
 
+def step_keys(block, index):
+    """The index of each step variable of the Heaviside form at one time; a single one has no number."""
+    return [(*index, k) for k in block.functions] if len(block.functions) > 1 else [index or None]
+
+
 def corners(disjunction):
     """The corners of the set that the jumping multipliers range over: a list of {variable: value}."""
     block, index = form_of(disjunction)
     if block.component('alpha') is not None:
-        alpha = [block.alpha[(*index, k)] for k in block.functions]
+        alpha = [block.alpha[key] for key in step_keys(block, index)]
         return [ComponentMap(zip(alpha, bits)) for bits in itertools.product((1.0, 0.0), repeat=len(alpha))]
-    if block.component('mu') is None:
-        return [ComponentMap([(block.nu[index or None], value)]) for value in (1.0, 0.0)]
     return [ComponentMap((block.nu[(*index, k)], float(k == on)) for k in block.regions) for on in block.regions]
 
 
@@ -330,7 +333,7 @@ def put_on(disjunction, number):
     block, index = form_of(disjunction)
     now = index or None
     if block.component('mu') is None:
-        for key in [now] if block.component('alpha') is None else [(*index, k) for k in block.functions]:
+        for key in step_keys(block, index):
             block.n[key].value = 0
             c = solution(block.switching[key], block.p[key])
             block.p[key].value, block.n[key].value = max(c, 0), max(-c, 0)
@@ -367,7 +370,7 @@ def violation(disjunction):
                 found.append(abs(residual(con)))
     for key, condition in block.complementarity.items():
         if _starts(key, index):
-            G, H = map(pyo.value, read(condition))
+            G, H = map(pyo.value, read_complementarity(condition))
             found.append(max(-G, -H, min(G, H)))
     return max(found)
 

@@ -1,4 +1,4 @@
-"""The import law of the design, and the public names."""
+"""The import law of docs/architecture.rst, and the public names."""
 
 import ast
 from pathlib import Path
@@ -8,47 +8,62 @@ import pytest
 import pyomo_fesd
 
 PACKAGE = Path(pyomo_fesd.__file__).parent
-ROOMS = ('dcs', 'elements', 'kinks', 'mpcc', 'units')
+#: Rooms from the ground up: a room imports only from rooms below its own row.
+FLOORS = (
+    ('core',),
+    ('modeling', 'units', 'smoothing', 'dcs', 'finite_elements', 'mpcc'),
+    ('results', 'analysis'),
+    ('diagnostics',),
+    ('solvers',),
+    ('simulation',),
+    ('refinement',),
+)
+#: The rooms inside a room, each importing only from those before it.
+INNER = {
+    'dcs': ('reading', 'forms', 'piecewise'),
+    'mpcc': ('compile', 'nlp', 'subproblems', 'algorithm', 'reporting', 'multistart'),
+}
+FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+FILES = sorted(path for path in PACKAGE.rglob('*.py') if path.parent != PACKAGE)
 
 
 def imports(path):
-    """Modules of the package that a file imports."""
+    """Modules of the package that a file imports from."""
     for node in ast.walk(ast.parse(path.read_text())):
-        names = [node.module] if isinstance(node, ast.ImportFrom) else [a.name for a in getattr(node, 'names', [])]
-        if isinstance(node, (ast.Import, ast.ImportFrom)):
-            yield from (n for n in names if n and n.startswith('pyomo_fesd.'))
+        if isinstance(node, ast.ImportFrom):
+            yield node.module or ''
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
 
 
-@pytest.mark.parametrize('room', ROOMS)
-def test_rooms_import_nothing_from_each_other(room):
-    others = tuple(f'pyomo_fesd.{other}' for other in ROOMS if other != room)
-    for path in (PACKAGE / room).glob('*.py'):
-        assert not [n for n in imports(path) if n.startswith(others)], path
+def imported_rooms(path):
+    """The dotted paths below the package that a file imports from, as lists of parts."""
+    return [name.split('.')[1:] for name in imports(path) if name.startswith('pyomo_fesd.')]
 
 
-def test_the_march_looks_at_elements_and_nothing_looks_at_the_march():
-    """It reads what the elements recorded, and compiles as the solver does; the solver itself it knows by Pyomo's name only."""
-    compiles = {f'pyomo_fesd.mpcc.{name}' for name in ('compile', 'phase', 'problem')}
-    for path in (PACKAGE / 'march').glob('*.py'):
-        others = set(imports(path)) - compiles
-        assert not [n for n in others if n.startswith(('pyomo_fesd.dcs', 'pyomo_fesd.mpcc', 'pyomo_fesd.solver'))], path
-    others = (p for p in PACKAGE.rglob('*.py') if p.parent.name not in ('march', 'accuracy'))
-    assert [p for p in others if any(n.startswith('pyomo_fesd.march') for n in imports(p))] == [PACKAGE / '__init__.py']
+def test_every_folder_is_a_room_with_a_floor():
+    folders = {p.parent.relative_to(PACKAGE).as_posix() for p in FILES}
+    inner = {f'{room}/{name}' for room, names in INNER.items() for name in names}
+    assert folders == set(FLOOR) | inner
 
 
-def test_accuracy_control_calls_the_transformation_the_solver_and_the_march_as_a_user_does():
-    for path in (PACKAGE / 'accuracy').glob('*.py'):
-        found = [
-            n for n in imports(path) if n.startswith(('pyomo_fesd.dcs', 'pyomo_fesd.mpcc', 'pyomo_fesd.solver', 'pyomo_fesd.march'))
-        ]
-        assert set(found) <= {'pyomo_fesd.march.simulate'}, path
-    others = (p for p in PACKAGE.rglob('*.py') if p.parent.name != 'accuracy')
-    assert [p for p in others if any(n.startswith('pyomo_fesd.accuracy') for n in imports(p))] == [PACKAGE / '__init__.py']
+@pytest.mark.parametrize('path', FILES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
+def test_a_room_is_entered_through_its_door_and_from_above(path):
+    room, *inside = path.relative_to(PACKAGE).parent.parts
+    for other, *module in imported_rooms(path):
+        if other != room:
+            assert FLOOR[other] < FLOOR[room], f'{room} imports from {other}, which does not lie below it'
+            assert not module, f'{other} is entered at {".".join(module)} and not through its door'
+        elif module and room in INNER and module[0] in INNER[room] and module[:1] != inside[:1]:
+            order = INNER[room]
+            assert not inside or order.index(module[0]) < order.index(inside[0]), f'{inside[0]} imports from {module[0]}'
+            assert len(module) == 1, f'{room}.{module[0]} is entered at {module[1]} and not through its door'
 
 
-def test_only_the_solvers_import_mpcc():
-    users = {p.name for p in PACKAGE.glob('*.py') if any(n.startswith('pyomo_fesd.mpcc') for n in imports(p))}
-    assert users == {'solver.py', 'casadi_ipopt.py'}
+def test_no_file_imports_from_the_package_itself():
+    for path in FILES:
+        modules = [node.module for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom)]
+        assert 'pyomo_fesd' not in modules, path
 
 
 def test_public_names():
@@ -67,6 +82,7 @@ def test_public_names():
         'projection',
         'refine',
         'report',
+        'signal',
         'simulate',
         'state_jump',
         'structure',

@@ -1,9 +1,9 @@
-"""Docstrings on their way into the reference page.
+"""Convert docstrings for the reference page.
 
 * "(theory, eq. 11)" becomes a link to that equation; "paper, eq. (8)" means the paper's own numbers and stays as it is.
-* ``|d|`` stays an absolute value, which reStructuredText would take for a substitution.
-* "Source: ..." at the end stands before the sections, of which napoleon would take it for a part.
-* The options that Pyomo writes into docstrings are cut off: they have a page of their own.
+* ``|d|`` stays an absolute value, which reStructuredText would read as a substitution.
+* "Source: ..." at the end is moved before the sections; napoleon would read it as a part of the last section.
+* The options that Pyomo writes into docstrings are removed: they have a page of their own.
 """
 
 import re
@@ -13,18 +13,18 @@ OPTIONS = ('**Class configuration**', 'Keyword Arguments')
 
 
 def target(number):
-    """Label of an equation on the theory page."""
+    """Return the label of an equation on the theory page."""
     return 'eq-' + number.replace("'", '-prime')
 
 
 def process(app, what, name, obj, options, lines):
-    """Handler of ``autodoc-process-docstring``; runs before napoleon."""
+    """Handle ``autodoc-process-docstring``; runs before napoleon."""
     end = next((i for i, line in enumerate(lines) if line in OPTIONS), len(lines))
     lines[:] = [_escaped(_linked(line)) for line in _source_first(lines[:end])] + ['']
 
 
 def _source_first(lines):
-    """The paragraph "Source: ..." moved before the first underlined heading."""
+    """Return the lines with the paragraph "Source: ..." before the first underlined heading."""
     heading = next((i for i, line in enumerate(lines[1:]) if line.startswith('---')), len(lines))
     start = next((i for i, line in enumerate(lines) if line.startswith('Source:')), len(lines))
     if start < heading:
@@ -37,7 +37,7 @@ def _linked(line):
 
 
 def _escaped(line):
-    """Bars escaped, but not inside a literal."""
+    """Escape bars outside literals."""
     return '``'.join(part if i % 2 else part.replace('|', r'\|') for i, part in enumerate(line.split('``')))
 
 

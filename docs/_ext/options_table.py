@@ -1,6 +1,6 @@
-"""``.. options-table:: package.module.Class``: a table name | default | meaning of the class's ``CONFIG``.
+"""``.. options-table:: package.module.Class``: a table of name, default and meaning of the options in the class's ``CONFIG``.
 
-The table is made when the page is built, so it cannot differ from the code.  Options that a base class declares are left out.
+The table is made when the page is built, so it agrees with the code. Options that a base class declares are left out.
 """
 
 from importlib import import_module
@@ -12,7 +12,7 @@ from pyomo.common.config import ConfigDict
 from sphinx.addnodes import pending_xref
 from sphinx.util.docutils import SphinxDirective
 
-WIDTHS = {'option': 22, 'default': 18, 'meaning': 60}
+WIDTHS = {'option': 27, 'default': 17, 'meaning': 56}
 
 
 class OptionsTable(SphinxDirective):
@@ -21,7 +21,7 @@ class OptionsTable(SphinxDirective):
     required_arguments = 1
 
     def run(self):
-        """One table."""
+        """Return the table."""
         module, _, name = self.arguments[0].rpartition('.')
         cls = getattr(import_module(module), name)
         self.env.note_dependency(getfile(cls))
@@ -40,7 +40,7 @@ class OptionsTable(SphinxDirective):
         return _row(_code(entry.name()), _code(default), meaning)
 
     def _linked(self, text):
-        """``text`` with citations of equations as links."""
+        """Yield nodes of ``text`` with citations of equations as links."""
         end = 0
         for found in CITATION.finditer(text):
             yield nodes.Text(text[end : found.start()])

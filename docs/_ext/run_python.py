@@ -1,17 +1,19 @@
-"""``.. run::``: Python that is executed when the page is built, and below it what it prints.
+"""``.. run::``: Python code that is executed when the page is built, followed by its output.
 
-The blocks of a page share one namespace.  The value of a last expression is shown as an interpreter shows it, a matplotlib Figure
-as a picture.  Warnings of the package are shown too.  With ``:raises:`` the block must end in an exception, whose message is
-shown; any other exception fails the build.
+The blocks of a page share one namespace. The value of a last expression is shown as an interpreter shows it, a matplotlib Figure
+as a picture. Warnings of the package are shown too. With ``:raises:`` the block must end in an exception, whose message is shown;
+any other exception fails the build. Long lines of messages are wrapped to the width of the page.
 """
 
 import ast
 import base64
 import io
 import logging
+import textwrap
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 
+import pandas as pd
 from docutils import nodes
 from docutils.parsers.rst import directives
 from matplotlib.figure import Figure
@@ -21,6 +23,8 @@ from sphinx.util.docutils import SphinxDirective
 import pyomo_fesd
 
 PACKAGE = Path(pyomo_fesd.__file__).parent
+WIDTH = 88  # characters in a code block
+pd.set_option('display.width', WIDTH)
 
 
 class Run(SphinxDirective):
@@ -30,7 +34,7 @@ class Run(SphinxDirective):
     option_spec = {'raises': directives.flag}
 
     def run(self):
-        """The code, what it printed, and its picture."""
+        """Return the code, its output and its picture."""
         for path in PACKAGE.rglob('*.py'):
             self.env.note_dependency(str(path))
         code = '\n'.join(self.content)
@@ -39,7 +43,8 @@ class Run(SphinxDirective):
             printed += f'{value!r}\n'
         shown = [nodes.literal_block(code, code, language='python')]
         if printed:
-            shown.append(nodes.literal_block(printed, printed.rstrip(), language='none', classes=['output']))
+            printed = _wrapped(printed.rstrip())
+            shown.append(nodes.literal_block(printed, printed, language='none', classes=['output']))
         if isinstance(value, Figure):
             shown.append(_picture(value))
         return shown
@@ -59,8 +64,21 @@ class Run(SphinxDirective):
         return stream.getvalue(), value
 
 
+def _wrapped(text):
+    """Wrap lines of prose that are too long; lines with runs of blanks are rows of a table and stay as they are."""
+    return '\n'.join(_wrapped_line(line) for line in text.split('\n'))
+
+
+def _wrapped_line(line):
+    words = line.lstrip()
+    if len(line) <= WIDTH or '  ' in words:
+        return line
+    indent = line[: len(line) - len(words)]
+    return textwrap.fill(words, WIDTH, initial_indent=indent, subsequent_indent=indent + '    ', break_on_hyphens=False)
+
+
 def _interpret(code, where, namespace):
-    """Execute all statements; the value of the last one if it is an expression."""
+    """Execute all statements; returns the value of the last one if it is an expression."""
     statements = ast.parse(code, where).body
     last = statements.pop() if isinstance(statements[-1], ast.Expr) else None
     exec(compile(ast.Module(statements, []), where, 'exec'), namespace)
@@ -69,7 +87,7 @@ def _interpret(code, where, namespace):
 
 @contextmanager
 def _captured():
-    """A stream that takes what is printed and what the package logs."""
+    """Yield a stream that collects printed output and the warnings of the package."""
     stream = io.StringIO()
     handler, logger = logging.StreamHandler(stream), logging.getLogger('pyomo_fesd')
     handler.setFormatter(logging.Formatter('WARNING: %(message)s'))

@@ -1,6 +1,14 @@
 """Additions to unit models that switch: ``m.fs.weir = pyomo_fesd.units.weir(m.fs.time, level=..., crest=..., flow=...)``.
 
-Each takes Vars and expressions over time of any Pyomo block, and returns a Block over time to be added; nothing here knows IDAES.
+Each function takes Vars and expressions over time of any Pyomo block, with or without IDAES, and returns a Block over time to be
+added to the model.  Read over_time.py first, which reads these quantities at each time; then
+
+weir.py, check_valve.py (both by one_way.py), saturation.py, split_range.py, vle.py
+    complementarity conditions
+relay.py with relief_valve.py and pump.py, anti_windup.py
+    Disjunctions, for ``fesd.dcs``
+scaling.py
+    scaling factors for a flowsheet
 """
 
 from pyomo_fesd.units.anti_windup import anti_windup

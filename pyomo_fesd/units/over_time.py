@@ -1,9 +1,8 @@
-"""What the unit additions have in common: a Block over time whose rule reads what it was given at each time.
+"""The common part of the unit additions: a Block over time whose rule reads the user's quantities at each time.
 
-Takes: quantities as the user has them: a component over time (also a Reference, as IDAES' ports hold), an expression or number
-that does not change, or a function (parent block, index, ...) -> expression.  A bare number has the unit of what it is compared
-with.
-Leaves: an unconstructed Block; its rule is an object and no closure, so that a clone's rule means the clone's own components.
+Takes: quantities: a component over time (also a Reference, as in IDAES' ports), an expression or number that does not change, or
+a function (parent block, index, ...) -> expression.  A bare number has the unit of the quantity that it is compared with.
+Leaves: an unconstructed Block; its rule is an object and not a closure, so that the rule of a clone refers to the clone.
 """
 
 from inspect import isroutine
@@ -12,16 +11,16 @@ from pyomo.common.numeric_types import native_numeric_types
 from pyomo.core import Block
 from pyomo.environ import units
 
-from pyomo_fesd.errors import FesdError
+from pyomo_fesd.core import FesdError
 
 
-def block_over(sets, build, **given):
-    """A Block over ``sets``; at each index ``build(block, **quantities there)`` fills it."""
+def block_over(sets, build, **given) -> Block:
+    """Return a Block over ``sets``; at each index ``build(block, **quantities at the index)`` fills it."""
     return Block(*sets, rule=_Rule(build, given))
 
 
 class _Rule:
-    """``build`` with what it was given; copied with the model."""
+    """``build`` with the quantities; copied with the model."""
 
     def __init__(self, build, given):
         self._build, self._given = build, given
@@ -31,13 +30,13 @@ class _Rule:
 
 
 class Law:
-    """A function that is no function of the time, such as that of a head."""
+    """A function of a quantity and not of time, such as a flow as a function of the head."""
 
     def __init__(self, function):
         self.function = function
 
     def __call__(self, x):
-        """The law's expression; a number stands for a proportional one."""
+        """The law as an expression; a number means proportional to ``x``."""
         given = self.function
         return given(x) if callable(given) and not hasattr(given, 'is_expression_type') else given * x
 
@@ -50,34 +49,34 @@ def _at(given, block, index, name):
         return given
     key = index if len(index) != 1 else index[0]
     try:
-        return given[key]  # not 'key in given': while pyomo.dae expands a model, data come into being when they are asked for
+        return given[key]  # not 'key in given': while pyomo.dae expands a model, access creates the data
     except KeyError as error:
         raise FesdError(
             block, f"{name}: '{given.name}' has no index {key}", "give a component over the same sets, or a function of them"
         ) from error
 
 
-def variable(given, block, name):
-    """``given``, which must be one variable: the addition defines it.
+def variable(given, block, name: str):
+    """Return ``given``, which must be a Var since the addition defines it.
 
     Raises
     ------
     FesdError
-        for anything else
+        if it is not a Var
     """
     if getattr(given, 'is_variable_type', bool)():
         return given
-    raise FesdError(block, f"{name}: '{given}' is no variable", "give the Var that is to be defined, e.g. a flow over time")
+    raise FesdError(block, f"{name}: '{given}' is not a Var", "give the Var that is to be defined, e.g. a flow over time")
 
 
-def like(number, quantity):
-    """A bare number with the unit of ``quantity``; everything else as it is."""
+def with_unit(number, quantity):
+    """Return a bare number with the unit of ``quantity``, and anything else as it is."""
     unit = None if number.__class__ not in native_numeric_types else units.get_units(quantity)
     return number if unit in (None, units.dimensionless) or not number else number * unit
 
 
-def refuse_order(block, low, high, names):
-    """Refuse limits in the wrong order, as far as they are numbers."""
-    both = [low, high]
-    if all(limit.__class__ in native_numeric_types for limit in both) and low >= high:
-        raise FesdError(block, f"{names[0]} = {low} is not below {names[1]} = {high}", "exchange them")
+def refuse_order(block, **limits) -> None:
+    """Refuse two limits, given as ``lower=..., upper=...`` by their own names, in the wrong order; only numbers are checked."""
+    (lower, low), (upper, high) = limits.items()
+    if all(limit.__class__ in native_numeric_types for limit in (low, high)) and low >= high:
+        raise FesdError(block, f"{lower} = {low} is not below {upper} = {high}", "exchange them")

@@ -1,4 +1,4 @@
-"""A pump that level switches turn on and off (relay).
+"""A pump that level switches turn on and off (``relay``).
 
     empties:   on from L = high down to L = low            fills:   on from L = low up to L = high
 
@@ -7,23 +7,24 @@ Leaves: the Disjuncts ``running`` and ``stopped`` with their Disjunction ``switc
 Does not apply: to a pump whose speed is controlled (``saturation``).
 """
 
+from pyomo.core import Block
+
 from pyomo_fesd.units.relay import relay
 
 
-def pump(*sets, level, low, high, flow, rate, fills=False, start='stopped'):
-    """A pump between two level switches.
+def pump(*sets, level, low, high, flow, rate, fills: bool = False, start='stopped') -> Block:
+    """Return a Block over ``sets`` with a pump between two level switches.
 
-    Name the Block in ``memory``: ``TransformationFactory('fesd.dcs').apply_to(m, memory=[m.pump])``.
+    Name the Block in ``hysteresis``: ``TransformationFactory('fesd.dcs').apply_to(m, hysteresis=[m.pump])``.
 
     Parameters
     ----------
     sets : Set, ...
         index sets, the ContinuousSet among them
-    level : Var, Expression, expression or function (block, index, ...) -> expression
-    low, high : number, Param, expression or function
-        the level switches
+    level, low, high : number, Param, Var, Expression, expression or function (block, index, ...) -> expression
+        the level and its switches
     flow : Var over ``sets``
-        what the pump conveys, which nothing else defines
+        the flow through the pump, defined by nothing else
     rate : number, Var, Expression, expression or function
         the flow while it runs, e.g. a pump curve
     fills : bool
@@ -31,16 +32,11 @@ def pump(*sets, level, low, high, flow, rate, fills=False, start='stopped'):
     start : 'stopped', 'running' or None
         at the first time; None: free
 
-    Returns
-    -------
-    Block over ``sets``, to be added to the model
-
     Raises
     ------
     FesdError
         as ``relay``
     """
+    names = ('running', 'stopped')
     acts = 'below' if fills else 'above'
-    return relay(
-        *sets, signal=level, low=low, high=high, output=flow, on=rate, acts=acts, start=start, names=('running', 'stopped')
-    )
+    return relay(*sets, signal=level, low=low, high=high, output=flow, on=rate, acts=acts, start=start, names=names)

@@ -1,44 +1,44 @@
-"""Switches with memory: relays, relief valves, pumps with level switches (eq. E1, E2).
+"""Switches with hysteresis: relays, relief valves, pumps with level switches (eq. E1, E2).
 
     acts above:   on while signal >= low,    off while signal <= high       (relief valve, pump that empties)
     acts below:   on while signal <= high,   off while signal >= low        (heater, pump that fills)
 
-Between low and high the last mode goes on.
+Between low and high the relay stays in its mode.
 
-Takes: the signal, the two thresholds, what is switched, and its value in each mode.
-Leaves: two Disjuncts with their Disjunction ``switch``; its multiplier comes from ``fesd.dcs`` with ``memory=[the Block]``.
-Does not apply: to thresholds that are equal; without a distance a relay chatters, or slides: write a Disjunction without memory.
+Takes: the signal, the two thresholds, the output, and its value in each mode.
+Leaves: two Disjuncts with their Disjunction ``switch``; its multiplier comes from ``fesd.dcs`` with ``hysteresis=[the Block]``.
+Does not apply: to equal thresholds, between which a relay chatters or slides: write a Disjunction without hysteresis.
 """
 
-from pyomo.core import Constraint
+from pyomo.core import Block, Constraint
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct, Disjunction
 
-from pyomo_fesd.errors import FesdError
-from pyomo_fesd.units.over_time import block_over, like, refuse_order, variable
+from pyomo_fesd.core import FesdError, TimeIndex
+from pyomo_fesd.units.over_time import block_over, refuse_order, variable, with_unit
 
-#: acts -> (how the signal stands to low and high while on, while off)
+#: acts -> (relation of the signal to low and high while on, while off)
 UNTIL = {
     'above': (lambda signal, low, high: signal >= low, lambda signal, low, high: signal <= high),
     'below': (lambda signal, low, high: signal <= high, lambda signal, low, high: signal >= low),
 }
 
 
-def relay(*sets, signal, low, high, output, on, off=0, acts='above', start=None, names=('on', 'off')):
-    """A switch with hysteresis.
+def relay(*sets, signal, low, high, output, on, off=0, acts='above', start=None, names=('on', 'off')) -> Block:
+    """Return a Block over ``sets`` with a switch that has hysteresis.
 
-    Name the Block in ``memory``: ``TransformationFactory('fesd.dcs').apply_to(m, memory=[m.relay])``.
+    Name the Block in ``hysteresis``: ``TransformationFactory('fesd.dcs').apply_to(m, hysteresis=[m.relay])``.
 
     Parameters
     ----------
     sets : Set, ...
         index sets, the ContinuousSet among them
     signal : Var, Expression, expression or function (block, index, ...) -> expression
-        what is measured
+        the measured quantity
     low, high : number, Param, expression or function
         the thresholds
     output : Var over ``sets``
-        what is switched, which nothing else defines
+        the switched quantity, defined by nothing else
     on, off : number, Var, Expression, expression or function
         the output in each mode
     acts : 'above' or 'below'
@@ -48,55 +48,37 @@ def relay(*sets, signal, low, high, output, on, off=0, acts='above', start=None,
     names : (str, str)
         of the two Disjuncts
 
-    Returns
-    -------
-    Block over ``sets``, to be added to the model
-
     Raises
     ------
     FesdError
         for thresholds in the wrong order, an unknown ``acts`` or ``start``, sets without a ContinuousSet; when the Block is added,
-        for an output that is no variable
+        for an output that is not a Var
     """
-    if acts not in UNTIL:
-        raise FesdError('relay', f"acts={acts!r} is neither of {list(UNTIL)}", "say where it is on")
-    if start is not None and start not in names:
-        raise FesdError('relay', f"start={start!r} is neither of {list(names)}", "name a mode, or leave it away")
+    for name, choice, known in (('acts', acts, list(UNTIL)), ('start', start, [*names, None])):
+        if choice not in known:
+            raise FesdError('relay', f"{name}={choice!r} is neither of {known[:2]}", f"give one of them as {name}")
     times = [s for s in sets if getattr(s, 'ctype', None) is ContinuousSet]
     if len(times) != 1:
-        raise FesdError('relay', "what remembers needs a time", "give one ContinuousSet among the sets, e.g. m.t")
-    refuse_order('relay', low, high, ('low', 'high'))
-    begin = _Begin(times[0], sets.index(times[0]), start)
+        raise FesdError('relay', "a switch with hysteresis needs a time", "give one ContinuousSet among the sets, e.g. m.t")
+    refuse_order('relay', low=low, high=high)
     given = dict(signal=signal, low=low, high=high, output=output, on=on, off=off)
-    return block_over(sets, _Build(acts, names, begin), **given)
-
-
-class _Begin:
-    """The mode at the first time."""
-
-    def __init__(self, time, position, start):
-        self._time, self._position, self._start = time, position, start
-
-    def fix(self, block):
-        """Fix the indicator of the first mode, if there is one and this is the first time."""
-        index = block.index() if isinstance(block.index(), tuple) else (block.index(),)
-        if self._start is not None and index[self._position] == self._time.first():
-            block.component(self._start).indicator_var.fix(True)
+    return block_over(sets, _Build(acts, names, times[0], start), **given)
 
 
 class _Build:
-    """How to fill one block."""
+    """Fill one block; at the first time, fix the mode to ``start``."""
 
-    def __init__(self, acts, names, begin):
-        self._acts, self._names, self._begin = acts, names, begin
+    def __init__(self, acts, names, wrt, start):
+        self._acts, self._names, self._wrt, self._start = acts, names, wrt, start
 
     def __call__(self, block, signal, low, high, output, on, off):
         output = variable(output, block, 'output')
-        low, high = like(low, signal), like(high, signal)
-        for name, until, is_on in zip(self._names, UNTIL[self._acts], (on, off)):
+        low, high = with_unit(low, signal), with_unit(high, signal)
+        for name, until, value in zip(self._names, UNTIL[self._acts], (on, off)):
             mode = Disjunct()
             block.add_component(name, mode)
             mode.until = Constraint(expr=until(signal, low, high))
-            mode.output = Constraint(expr=output == like(is_on, output))
+            mode.output = Constraint(expr=output == with_unit(value, output))
         block.switch = Disjunction(expr=[block.component(name) for name in self._names])
-        self._begin.fix(block)
+        if self._start is not None and TimeIndex(self._wrt).time(block) == self._wrt.first():
+            block.component(self._start).indicator_var.fix(True)

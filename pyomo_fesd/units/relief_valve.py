@@ -1,4 +1,4 @@
-"""A relief valve with hysteresis: it pops at one pressure and reseats at a lower one (relay).
+"""A relief valve with hysteresis: it pops at one pressure and reseats at a lower one (``relay``).
 
     closed while p <= opens:   F = 0,          open while p >= reseats:   F = capacity
 
@@ -7,36 +7,33 @@ Leaves: the Disjuncts ``open`` and ``closed`` with their Disjunction ``switch``.
 Does not apply: to a proportional relief valve, which opens with the excess of pressure: that is a ``weir`` of the pressure.
 """
 
+from pyomo.core import Block
+
 from pyomo_fesd.units.relay import relay
 
 
-def relief_valve(*sets, pressure, opens, reseats, flow, capacity, start='closed'):
-    """Closed up to ``opens``; once open, down to ``reseats``.
+def relief_valve(*sets, pressure, opens, reseats, flow, capacity, start='closed') -> Block:
+    """Return a Block over ``sets`` with a valve that is closed up to ``opens`` and, once open, stays open down to ``reseats``.
 
-    Name the Block in ``memory``: ``TransformationFactory('fesd.dcs').apply_to(m, memory=[m.relief])``.
+    Name the Block in ``hysteresis``: ``TransformationFactory('fesd.dcs').apply_to(m, hysteresis=[m.relief])``.
 
     Parameters
     ----------
     sets : Set, ...
         index sets, the ContinuousSet among them
-    pressure : Var, Expression, expression or function (block, index, ...) -> expression
-    opens, reseats : number, Param, expression or function
-        set pressure, and the lower one at which it closes
+    pressure, opens, reseats : number, Param, Var, Expression, expression or function (block, index, ...) -> expression
+        pressure, set pressure, and the lower pressure at which the valve closes
     flow : Var over ``sets``
-        what it lets out, which nothing else defines
+        the flow through the valve, defined by nothing else
     capacity : number, Var, Expression, expression or function
         the flow while it is open
     start : 'closed', 'open' or None
         at the first time; None: free
-
-    Returns
-    -------
-    Block over ``sets``, to be added to the model
 
     Raises
     ------
     FesdError
         as ``relay``
     """
-    switched = dict(signal=pressure, low=reseats, high=opens, output=flow, on=capacity, acts='above', start=start)
-    return relay(*sets, **switched, names=('open', 'closed'))
+    names = ('open', 'closed')
+    return relay(*sets, signal=pressure, low=reseats, high=opens, output=flow, on=capacity, start=start, names=names)

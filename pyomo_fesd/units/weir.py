@@ -1,4 +1,4 @@
-"""An overflow weir (one_way; with a law of the head theory, eq. 8).
+"""An overflow weir (``one_way``; with a law of the head theory, eq. 8).
 
     ideal          0 <= F  perp  crest - level >= 0                      the level never rises above the crest
     resistance r   0 <= F  perp  crest + r(F) - level >= 0               F = k (level - crest): r(F) = F/k
@@ -9,19 +9,17 @@ Leaves: ``pair``; with ``discharge`` also the variable ``head`` and the equation
 Does not apply: to a weir under water on its far side.
 """
 
-from pyomo.core import Constraint, Var
+from pyomo.core import Block, Constraint, Var
 from pyomo.environ import units
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd import marks
-from pyomo_fesd.errors import FesdError
+from pyomo_fesd.core import FesdError, switched_systems, value_or_zero
 from pyomo_fesd.units.one_way import one_way
-from pyomo_fesd.units.over_time import Law, block_over, like, variable
-from pyomo_fesd.values import finite
+from pyomo_fesd.units.over_time import Law, block_over, variable, with_unit
 
 
-def weir(*sets, level, crest, flow, resistance=None, discharge=None):
-    """Overflow: nothing below the crest; at it, or above it, what the law says.
+def weir(*sets, level, crest, flow, resistance=None, discharge=None) -> Block:
+    """Return a Block over ``sets`` with the overflow of a weir: zero below the crest, and by the law at or above it.
 
     Parameters
     ----------
@@ -30,26 +28,22 @@ def weir(*sets, level, crest, flow, resistance=None, discharge=None):
     level : Var, Expression, expression or function (block, index, ...) -> expression
         liquid level or volume
     crest : number, Param, expression or function
-        where the overflow begins
+        the level at which the overflow begins
     flow : Var over ``sets``
-        what leaves over the weir, which nothing else defines
+        the flow over the weir, defined by nothing else
     resistance : number or function flow -> head, optional
-        the head over the crest that it takes; a number r means r*flow.  Default: none, an ideal weir
+        the head over the crest that the flow needs; a number r means r*flow.  Default: none, an ideal weir
     discharge : function head -> flow, optional
-        the same the other way round
-
-    Returns
-    -------
-    Block over ``sets``, to be added to the model: ``m.fs.weir = weir(m.fs.time, ...)``
+        the flow that the head causes, in place of ``resistance``
 
     Raises
     ------
     FesdError
-        for both laws at once; when the Block is added, for a flow that is no variable
+        for both laws at once; when the Block is added, for a flow that is not a Var
 
     Example
     -------
-    ``weir(m.fs.time, level=m.fs.tank.volume, crest=1.2, flow=m.fs.tank.outlet.flow_vol)``
+    ``m.fs.weir = weir(m.fs.time, level=m.fs.tank.volume, crest=1.2, flow=m.fs.tank.outlet.flow_vol)``
     """
     if resistance is not None and discharge is not None:
         raise FesdError('weir', "both a resistance and a discharge are given", "give one of them")
@@ -60,12 +54,12 @@ def weir(*sets, level, crest, flow, resistance=None, discharge=None):
 
 
 def _by_flow(block, level, crest, flow, resistance):
-    one_way(block, variable(flow, block, 'flow'), level - like(crest, level), resistance)
+    one_way(block, variable(flow, block, 'flow'), level - with_unit(crest, level), resistance)
 
 
 def _by_head(block, level, crest, flow, discharge):
-    above = level - like(crest, level)
-    block.head = Var(bounds=(0, None), initialize=max(0.0, finite(above)), units=units.get_units(above))
+    above = level - with_unit(crest, level)
+    block.head = Var(bounds=(0, None), initialize=max(0.0, value_or_zero(above)), units=units.get_units(above))
     block.pair = Complementarity(expr=complements(block.head >= 0, above - block.head <= 0))
     block.flow = Constraint(expr=variable(flow, block, 'flow') == discharge(block.head))
-    marks.mark(block, marks.CONTINUOUS, block.head, block.pair)
+    switched_systems(block).continuous[block.head] = block.pair

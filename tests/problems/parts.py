@@ -4,32 +4,32 @@ from dataclasses import dataclass
 
 from pyomo.common.timing import HierarchicalTimer
 
-from pyomo_fesd.mpcc.branches import Branches
-from pyomo_fesd.mpcc.built import Built
-from pyomo_fesd.mpcc.compile import compile_problem
-from pyomo_fesd.mpcc.compiled import Compiled
-from pyomo_fesd.mpcc.config import MpecHybridConfig
-from pyomo_fesd.mpcc.deadline import Deadline
-from pyomo_fesd.mpcc.gap import GapTest
-from pyomo_fesd.mpcc.hybrid import FAR_SIGHTED
-from pyomo_fesd.mpcc.parameters import parameter_data
-from pyomo_fesd.mpcc.problem import read_problem
-from pyomo_fesd.mpcc.run import Run, Tolerances
-from pyomo_fesd.mpcc.steps import Steps
+from pyomo_fesd.mpcc.algorithm.branches import Branches
+from pyomo_fesd.mpcc.algorithm.gap_test import GapTest
+from pyomo_fesd.mpcc.algorithm.hybrid import GLOBAL_LPEC_SEARCH
+from pyomo_fesd.mpcc.algorithm.state import Run, Setup, Tolerances
+from pyomo_fesd.mpcc.algorithm.subsolves import Subsolves
+from pyomo_fesd.mpcc.compile.compile import compile_mpcc
+from pyomo_fesd.mpcc.compile.mpcc_functions import MpccFunctions
+from pyomo_fesd.mpcc.compile.parameters import parameter_data
+from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc
+from pyomo_fesd.mpcc.nlp.deadline import Deadline
+from pyomo_fesd.mpcc.subproblems.solver_cache import SolverCache
+from pyomo_fesd.solvers.options import MpecHybridConfig
 
 
 def compiled(model, parameters=()):
     """The compiled MPCC of a Pyomo model."""
-    return compile_problem(read_problem(model), HierarchicalTimer(), parameters=parameter_data(parameters))
+    return compile_mpcc(read_mpcc(model), HierarchicalTimer(), parameters=parameter_data(parameters))
 
 
 @dataclass
 class Parts:
     """One run's parts; see their classes."""
 
-    compiled: Compiled
+    compiled: MpccFunctions
     run: Run
-    steps: Steps
+    subsolves: Subsolves
     gap: GapTest
     branches: Branches
 
@@ -38,17 +38,17 @@ class Parts:
         return [values[v.name] for v in self.compiled.variables]
 
     def kinds(self, kind):
-        """The steps of this kind."""
-        return [step for step in self.run.steps if step.kind == kind]
+        """The log entries of this kind."""
+        return [entry for entry in self.run.steps if entry.kind == kind]
 
 
 def parts(model, **options):
     """The parts for a Pyomo model and options of ``mpec_hybrid``."""
     config, c, run = MpecHybridConfig(), compiled(model), Run()
     config.set_value(options)
-    built = Built(c)
-    built.prepare(config)
-    tolerances = Tolerances.of(config)
-    steps = Steps(c, config, tolerances, run, HierarchicalTimer(), lambda step: None, Deadline(), built)
+    cache = SolverCache(c)
+    cache.prepare(config)
+    setup = Setup(c, config, HierarchicalTimer(), Deadline(), cache, show=lambda entry: None, after=lambda run: None)
+    subsolves = Subsolves(setup, Tolerances.of(config), run)
     gap = GapTest(config.gap_tol * 1e-2, config.gap_tol)
-    return Parts(c, run, steps, gap, Branches(c, steps, tolerances, gap, FAR_SIGHTED[config.lpec](c)))
+    return Parts(c, run, subsolves, gap, Branches(subsolves, gap, GLOBAL_LPEC_SEARCH[config.lpec](c)))

@@ -10,7 +10,7 @@ import pyomo.environ as pyo
 from problems.states import over_time
 
 import pyomo_fesd
-from pyomo_fesd import kink
+from pyomo_fesd.core import add_positive_part, declare_positive_part
 
 GRAVITY, DRAG, RESTITUTION, HEIGHT = 9.81, 0.3, 0.7, 0.8
 
@@ -44,10 +44,10 @@ def build(nfe=12, ncp=4, scheme='LAGRANGE-RADAU'):
     pyo.TransformationFactory('dae.collocation').apply_to(m, wrt=m.t, nfe=nfe, ncp=ncp, scheme=scheme)
     m.kinematics = pyo.Constraint(m.t, rule=lambda m, t: m.dq[t] == m.v[t])
     m.up = pyo.Block()
-    kink.declare(m.up, m.t)
+    declare_positive_part(m.up, m.t)
 
     def newton(m, t):
-        size = 2 * kink.add(m.up, (t,), m.v[t]) - m.v[t]
+        size = 2 * add_positive_part(m.up, (t,), m.v[t]) - m.v[t]
         return m.dv[t] == -GRAVITY - DRAG * m.v[t] * size
 
     m.newton = pyo.Constraint(m.t, rule=newton)

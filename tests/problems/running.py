@@ -3,6 +3,7 @@
 import pyomo.environ as pyo
 
 import pyomo_fesd
+from pyomo_fesd.core import all_hints
 from tests.models import dcs, snapshot
 
 RADAU, LEGENDRE = 'LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE'
@@ -45,7 +46,7 @@ def multipliers(wrt):
 
 
 def seen(m):
-    """``snapshot`` and marks, without the order of declaration and without stale flags, which Pyomo has for all models."""
+    """``snapshot``, marks and hints, without the order of declaration and without stale flags, which Pyomo has for all models."""
     found = {}
     for key, value in snapshot(m).items():
         if key[1:] == ('components',):
@@ -55,4 +56,5 @@ def seen(m):
         found[key] = value
     for suffix in m.component_data_objects(pyo.Suffix):
         found[suffix.name, 'marked'] = sorted(component.name for component in suffix)
-    return found
+    hints = all_hints(m)
+    return found | {('hints', kind): len(getattr(hints, kind)) for kind in hints.__slots__}

@@ -28,14 +28,14 @@ def rate(m, name, rule):
     m.add_component('ode_' + name, pyo.Constraint(m.t, rule=lambda m, t: m.component('d' + name)[t] == rule(m, t)))
 
 
-def solved(m, nfe=8, ncp=3, clone=True, memory=()):
+def solved(m, nfe=8, ncp=3, clone=True, hysteresis=()):
     """A clone, transformed and solved; certified, and without a warning."""
     m = m.clone() if clone else m
-    pyo.TransformationFactory('fesd.dcs').apply_to(m, memory=list(memory))
+    pyo.TransformationFactory('fesd.dcs').apply_to(m, hysteresis=list(hysteresis))
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=nfe, ncp=ncp)
-    if memory:
+    if hysteresis:
         pyomo_fesd.simulate(m)
-    results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=bool(memory))
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=bool(hysteresis))
     assert results.solver.stationarity == 'B' and not results.solver.warnings
     return m
 
@@ -52,7 +52,7 @@ def added(block):
 
 
 def assert_units_consistent(block):
-    """Pyomo's check of the units of all equations, and of what stands on each side of the conditions, which it leaves out."""
+    """Check the units of all equations by Pyomo, and of the sides of the conditions, which Pyomo leaves out."""
     for equation in block.component_data_objects(pyo.Constraint):
         check_units.assert_units_consistent(equation)
     for condition in block.component_data_objects(Complementarity):

@@ -53,5 +53,5 @@ def test_units():
 
 def test_refused():
     m = plant(1, p=0.0)
-    with pytest.raises(pyomo_fesd.FesdError, match='is no variable'):
+    with pytest.raises(pyomo_fesd.FesdError, match='is not a Var'):
         m.valve = check_valve(m.t, upstream=m.p, downstream=0, flow=3.0)

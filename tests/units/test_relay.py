@@ -18,7 +18,7 @@ def test_a_heater_is_the_thermostat():
     m.heater = relay(m.t, signal=m.y, low=18, high=20, output=m.Q, on=10, acts='below', start='on')
     rate(m, 'y', lambda m, t: m.Q[t] - m.y[t] / 5)
     m = m.clone()
-    assert switching_times(solved(m, nfe=15, clone=False, memory=[m.heater])) == pytest.approx(
+    assert switching_times(solved(m, nfe=15, clone=False, hysteresis=[m.heater])) == pytest.approx(
         thermostat.switching_times(), abs=1e-8
     )
 
@@ -30,7 +30,7 @@ def test_a_relief_valve_pops_and_reseats():
     m.relief = relief_valve(m.t, pressure=m.p, opens=2, reseats=1, flow=m.F, capacity=lambda m, t: 2 / units.s * m.p[t])
     rate(m, 'p', lambda m, t: 1 * units.bar / units.s - m.F[t])
     assert_units_consistent(m.relief[0].open)
-    m = solved(m, nfe=36, clone=False, memory=[m.relief])
+    m = solved(m, nfe=36, clone=False, hysteresis=[m.relief])
     falls, rises = log(3) / 2, 1.0  # from 2 to 1 towards 1/2, from 1 to 2
     assert switching_times(m) == pytest.approx(list(accumulate([2, falls, rises, falls])), abs=1e-6)
     names = [(s.before, s.after) for s in pyomo_fesd.switches(m)]
@@ -44,7 +44,7 @@ def test_a_pump_between_two_level_switches(fills, flows, times):
     m.F = pyo.Var(m.t, initialize=0)
     m.pump = pump(m.t, level=m.L, low=1 if not fills else 0, high=3 if not fills else 2, flow=m.F, rate=3, fills=fills)
     rate(m, 'L', lambda m, t: flows + (m.F[t] if fills else -m.F[t]))
-    m = solved(m, nfe=12, clone=False, memory=[m.pump])
+    m = solved(m, nfe=12, clone=False, hysteresis=[m.pump])
     assert switching_times(m) == pytest.approx(times, abs=1e-8)
 
 
@@ -54,7 +54,7 @@ def test_a_pump_between_two_level_switches(fills, flows, times):
         (dict(low=3, high=1), 'not below'),
         (dict(acts='sideways'), 'neither of'),
         (dict(start='open'), 'neither of'),
-        (dict(output=1.0), 'is no variable'),
+        (dict(output=1.0), 'is not a Var'),
     ],
 )
 def test_refused(given, said):

@@ -93,7 +93,7 @@ def elsewhere():
 @pytest.mark.parametrize(
     'given, said',
     [
-        (dict(flow=lambda m, t: 2 * m.F[t]), 'is no variable'),
+        (dict(flow=lambda m, t: 2 * m.F[t]), 'is not a Var'),
         (dict(resistance=1, discharge=1), 'both a resistance and a discharge'),
         (dict(level=elsewhere()), 'has no index'),
     ],

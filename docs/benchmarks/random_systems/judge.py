@@ -1,0 +1,68 @@
+"""One run of a random system with one method, and its verdict."""
+
+import logging
+from contextlib import contextmanager
+
+import numpy as np
+import pyomo.environ as pyo
+from benchmarks.random_systems.systems import end_state, model, transform
+
+import pyomo_fesd
+
+#: Largest error of a right answer, relative to the largest size of each state on the way.
+TOLERANCE = 1e-3
+RIGHT, ALARM, REFUSED, WRONG = 'right', 'right with a warning', 'refused', 'silently wrong'
+VERDICTS = (RIGHT, ALARM, REFUSED, WRONG)
+
+
+@contextmanager
+def warnings_of_package():
+    """Collect the warnings of pyomo_fesd in a list."""
+    logger, said = logging.getLogger('pyomo_fesd'), []
+    handler = logging.Handler(logging.WARNING)
+    handler.emit = lambda record: said.append(record.getMessage())
+    logger.addHandler(handler)
+    kept, logger.propagate = logger.propagate, False
+    try:
+        yield said
+    finally:
+        logger.removeHandler(handler)
+        logger.propagate = kept
+
+
+def simulate(m, limit):
+    """Run ``simulate``; it raises an error where it does not succeed."""
+    pyomo_fesd.simulate(m, time_limit=limit)
+    return 'simulated'
+
+
+def mpec_hybrid(m, limit):
+    """Run ``mpec_hybrid`` at its defaults; raises an error where it claims no solution."""
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, time_limit=limit)
+    if results.solver.termination_condition != pyo.TerminationCondition.optimal:
+        raise RuntimeError(f'{results.solver.termination_condition}: {results.solver.message}')
+    return str(results.solver.message)
+
+
+METHODS = {'simulate': simulate, 'mpec_hybrid': mpec_hybrid}
+
+
+def run(system, found, method, limit):
+    """Return the verdict, the error and the messages of one run."""
+    with warnings_of_package() as said:
+        try:
+            m = transform(model(system), system)
+            status = METHODS[method](m, limit)
+        except Exception as error:
+            return REFUSED, np.nan, f'{type(error).__name__}: {error}'.replace('\n', ' ')[:300]
+    error = np.max(np.abs(end_state(m, system) - found.x) / np.maximum(found.size, 1e-2))
+    return _verdict(found, error, bool(said)), error, ' | '.join([status, *said]).replace('\n', ' ')[:300]
+
+
+def _verdict(found, error, warned):
+    if not found.unique:
+        # one of several solutions, which has to be said
+        return RIGHT if warned else WRONG
+    if error <= TOLERANCE:
+        return ALARM if warned else RIGHT
+    return REFUSED if warned else WRONG

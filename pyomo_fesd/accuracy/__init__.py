@@ -1,1 +1,0 @@
-"""Accuracy control: rounds of solutions on finer and finer grids, until they agree to a tolerance."""

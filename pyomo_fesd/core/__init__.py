@@ -1,0 +1,80 @@
+"""Concepts that all rooms share: errors, time in an index, grids, complementarity, expression keys, and the three records.
+
+Read first ``errors``, ``time_index``, ``grid`` and ``complementarity``, then the records: ``switched_systems`` (which
+components switch; written before discretisation), ``moving_grid`` with ``boundary_laws`` (elements of variable length; written
+by ``fesd.finite_elements``) and ``homotopy_hints`` (for the solver; no time in it).  ``private_data`` keeps them on blocks,
+``generated`` recognises generated blocks, ``renamed`` refuses words of earlier versions, ``rollback`` undoes what was left half
+done, ``interruption`` lets Ctrl-C wait where something would be, ``withheld_messages`` keeps back the messages of one thread,
+``turns`` lets threads wait for one another.  ``evaluation``, ``gradient``, ``interpolation``, ``positive_part``,
+``expression_key`` and ``phase`` are tools.  This room imports from no other.
+"""
+
+from pyomo_fesd.core.boundary_laws import Hysteresis, StateJumps
+from pyomo_fesd.core.complementarity import Mixed, Pair, distance_to_bound, read_complementarity, read_side
+from pyomo_fesd.core.errors import FesdError
+from pyomo_fesd.core.evaluation import kept_values, known_sign, mutable_parameters, value_or_nan, value_or_zero
+from pyomo_fesd.core.expression_key import Swap, component_key, expression_key, prefix_tokens
+from pyomo_fesd.core.generated import GENERATED, is_generated, public_name, source_name
+from pyomo_fesd.core.gradient import gradient
+from pyomo_fesd.core.grid import (
+    ONE_ELEMENT_SCHEMES,
+    Element,
+    Grid,
+    finest_resolution,
+    label_decimals,
+    read_grid,
+    share_elements,
+)
+from pyomo_fesd.core.homotopy_hints import (
+    BranchConstraint,
+    Change,
+    Coincidence,
+    Follower,
+    HomotopyHints,
+    NeighbourBranch,
+    Penalty,
+    all_hints,
+    homotopy_hints,
+)
+from pyomo_fesd.core.interpolation import interpolation_weights
+from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible
+from pyomo_fesd.core.moving_grid import MovingGrid, Split, moving_grids
+from pyomo_fesd.core.phase import phase
+from pyomo_fesd.core.positive_part import add_positive_part, declare_positive_part
+from pyomo_fesd.core.private_data import records_below, remember_records
+from pyomo_fesd.core.renamed import Renamed
+from pyomo_fesd.core.rollback import restored_on_error
+from pyomo_fesd.core.switched_systems import (
+    HysteresisMode,
+    Reset,
+    Step,
+    Surface,
+    SwitchedSystems,
+    TimeWriter,
+    add_writer,
+    all_switched_systems,
+    integrand_rewriter,
+    signal_breakpoints,
+    signals,
+    switched_systems,
+    write_at_further_times,
+)
+from pyomo_fesd.core.time_index import (
+    DISCRETISATION,
+    TimeIndex,
+    ancestry,
+    continuous_sets,
+    derivatives,
+    discretised,
+    find_continuous_set,
+    index_sets,
+    index_tuple,
+    is_discretisation_equation,
+    is_indexed_by,
+    refuse_foreign,
+    refuse_no_model,
+    strip_time,
+)
+from pyomo_fesd.core.turns import REDIRECTION, TRANSFORMATION
+from pyomo_fesd.core.version import __version__
+from pyomo_fesd.core.withheld_messages import withheld_messages

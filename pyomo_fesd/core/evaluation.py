@@ -1,0 +1,61 @@
+"""Evaluate expressions that may be undefined, and read their signs and mutable Params."""
+
+from collections.abc import Iterable
+from contextlib import contextmanager
+from math import isfinite, nan
+
+from pyomo.common.errors import InfeasibleConstraintException, IntervalException
+from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
+from pyomo.core import value
+from pyomo.core.expr.visitor import identify_mutable_parameters
+
+from pyomo_fesd.core.interruption import DeferredInterrupt
+
+
+def value_or_nan(expr) -> float:
+    """Value of ``expr`` at the present values of its variables; NaN where it is undefined."""
+    try:
+        found = None if expr is None else value(expr, exception=False)
+    except (ArithmeticError, ValueError, NotImplementedError):
+        # Pyomo cannot evaluate a PiecewiseLinearFunction
+        found = None
+    return nan if found is None or isinstance(found, complex) else found
+
+
+def value_or_zero(expr) -> float:
+    """Value of ``expr`` at the present values of its variables; 0 where it is undefined or infinite."""
+    found = value_or_nan(expr)
+    return found if isfinite(found) else 0.0
+
+
+@contextmanager
+def kept_values(variables: Iterable):
+    """Put back the values and stale flags of ``variables`` when the body is left."""
+    kept = [(v, v.value, v.stale) for v in variables]
+    with DeferredInterrupt() as interrupt:
+        try:
+            with interrupt.raising():
+                yield
+        finally:
+            for v, number, stale in kept:
+                v.set_value(number, skip_validation=True)
+                v.stale = stale
+
+
+def mutable_parameters(expr):
+    """Yield the mutable Params of ``expr``, without the units that Pyomo's own function yields too."""
+    return (p for p in identify_mutable_parameters(expr) if p.is_parameter_type())
+
+
+def known_sign(z) -> int:
+    """Return 1 if z >= 0 wherever the declared bounds hold, -1 if z <= 0 there, 0 if the bounds do not decide.
+
+    A fixed Var counts with its declared bounds and a mutable Param as unknown: both may have another value later.
+    """
+    if any(True for _ in mutable_parameters(z)):
+        return 0
+    try:
+        low, high = ExpressionBoundsVisitor().walk_expression(z)
+    except (InfeasibleConstraintException, IntervalException, ArithmeticError, KeyError):
+        return 0  # no interval arithmetic for a function in z, or none that fits its bounds
+    return 1 if low >= 0 else -1 if high <= 0 else 0

@@ -1,0 +1,126 @@
+"""Keys of expressions: hashable, and equal for expressions that are built alike.
+
+A Disjunction has the same key at every time, and so has another one that the same rule wrote.  The analysis of one is reused for
+the others, with their variables exchanged for those of the first one.
+"""
+
+from functools import cache
+
+from pyomo.common.numeric_types import native_types
+from pyomo.core import value
+from pyomo.core.expr import numeric_expr as nodes
+from pyomo.core.expr import relational_expr as relations
+from pyomo.core.expr.visitor import ExpressionReplacementVisitor
+
+#: Operations that are described by their class, the number of their arguments and a detail; subclasses are like them.
+DETAILS = {
+    nodes.UnaryFunctionExpression: nodes.UnaryFunctionExpression.getname,
+    nodes.ExternalFunctionExpression: lambda node: id(node._fcn),
+    relations.InequalityExpression: lambda node: node.strict,
+    relations.RangedExpression: lambda node: node.strict,
+} | dict.fromkeys(
+    (nodes.SumExpression, nodes.ProductExpression, nodes.DivisionExpression, nodes.PowExpression, nodes.NegationExpression)
+    + (relations.EqualityExpression,),
+    lambda node: None,
+)
+
+
+@cache
+def _detail(cls):
+    """The function that reads the detail of the nodes of a class; None for a class that is not in ``DETAILS``."""
+    return next((detail for known, detail in DETAILS.items() if issubclass(cls, known)), None)
+
+
+class _NoKey(Exception):
+    """An operation is not in ``DETAILS``."""
+
+
+def prefix_tokens(expressions, leaf, number=None) -> tuple:
+    """Prefix notation of some expressions together.
+
+    Parameters
+    ----------
+    expressions : iterable of expressions
+    leaf : callable node -> (hashable, sequence of expressions)
+        the token of a variable, Param, named Expression or operation that is not in ``DETAILS``, and expressions to enter
+    number : callable number -> hashable, optional
+        the token of a number, by default the number itself
+    """
+    tokens, waiting = [], list(expressions)[::-1]
+    while waiting:
+        node = waiting.pop()
+        detail = _detail(node.__class__)
+        if node.__class__ in native_types:
+            tokens.append(node if number is None else number(node))
+        elif detail is not None:
+            arguments = node.args
+            tokens.append((node.__class__, len(arguments), detail(node)))
+            waiting.extend(arguments[::-1])
+        else:
+            token, inner = leaf(node)
+            tokens.append(token)
+            waiting.extend(inner[::-1])
+    return tuple(tokens)
+
+
+def component_key(expr) -> tuple:
+    """Return a key that is equal for expressions built alike from the same components and numbers.
+
+    A named Expression counts as one component, since its content may change; so does an operation that is not in ``DETAILS``.
+    """
+    return prefix_tokens([expr], lambda node: (('id', id(node)), ()))
+
+
+def expression_key(expressions, kind) -> tuple:
+    """Return a key that is equal for expressions built alike from other variables, and the components of the expressions.
+
+    Parameters
+    ----------
+    expressions : iterable of expressions
+    kind : callable VarData -> hashable
+        properties of a variable that belong to the key; of a Param its value belongs to it
+
+    Returns
+    -------
+    hashable or None
+        None where the expressions contain an operation that is not in ``DETAILS``
+    list of variables, Params and named Expressions, each once
+    """
+    numbers, parts, kinds = {}, [], []
+
+    def leaf(node):
+        inner = ()
+        if id(node) not in numbers:
+            if node.is_named_expression_type():
+                inner, sort = (node.expr,), None
+            elif node.is_expression_type():
+                raise _NoKey
+            else:
+                sort = kind(node) if node.is_variable_type() else value(node, exception=False)
+            numbers[id(node)] = len(parts)
+            parts.append(node)
+            kinds.append(sort)
+        return (numbers[id(node)],), inner
+
+    try:
+        return (prefix_tokens(expressions, leaf), tuple(kinds)), parts
+    except _NoKey:
+        return None, []
+
+
+class Swap:
+    """Exchange the components of one expression for those of another that has the same ``expression_key``."""
+
+    #: Pyomo takes longer to make a visitor than to use it.
+    _VISITOR = ExpressionReplacementVisitor()
+
+    def __init__(self, parts, others):
+        self._other = {id(part): other for part, other in zip(parts, others)}
+
+    def __getitem__(self, part):
+        return self._other[id(part)]
+
+    def expression(self, expr):
+        """Return ``expr`` with the components of the other."""
+        self._VISITOR.substitute = self._other
+        return self._VISITOR.walk_expression(expr)

@@ -1,0 +1,206 @@
+"""Hints for the homotopy of an MPCC: what it may treat softly, and where better branches may be found.
+
+Takes: nothing; a transformation or a user writes ``homotopy_hints(block)`` for the components of ``block``.
+Leaves: a record in the private data of the block, which ``mpec_hybrid`` reads; it disappears with the block.
+"""
+
+from dataclasses import dataclass
+
+from pyomo.common.autoslots import AutoSlots
+from pyomo.common.collections import ComponentMap
+from pyomo.core import Block
+from pyomo.core.base.constraint import ConstraintData
+from pyomo.core.base.expression import ExpressionData
+from pyomo.core.base.var import VarData
+from pyomo.mpec.complementarity import ComplementarityData
+
+from pyomo_fesd.core.private_data import records_below
+
+SCOPE = 'pyomo_fesd.core.homotopy_hints'
+
+
+@dataclass(frozen=True, eq=False)
+class BranchConstraint:
+    """A pair 0 <= G perp eta >= 0 that the homotopy leaves out and each branch decides (theory, eq. 13).
+
+    Attributes
+    ----------
+    pair : ComplementarityData
+        its second side is eta
+    constraint : ConstraintData
+        an inactive equation, equivalent to G = 0, which a branch imposes if eta is positive there
+    tentative : bool
+        whether a branch without a solution is solved again without it
+    """
+
+    pair: ComplementarityData
+    constraint: ConstraintData
+    tentative: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Penalty:
+    """A term ``weight * expression`` (a named Expression) that guides the homotopy; never part of the reported objective."""
+
+    expression: ExpressionData
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class NeighbourBranch:
+    """A branch beside a solution that no small step reaches, because several pairs have to change together.
+
+    Attributes
+    ----------
+    starts : tuple of (VarData, float)
+        values at which variables start in this branch
+    if_at_lower_bound : tuple of VarData
+        the branch is tried only from a solution with one of these at its lower bound; empty: from every solution
+    takes_over : tuple of (ComplementarityData, ComplementarityData)
+        the first pair gets the zero side that the second one has in the solution
+    first_side_zero : tuple of ComplementarityData
+        pairs whose first side becomes zero
+    """
+
+    starts: tuple[tuple[VarData, float], ...] = ()
+    if_at_lower_bound: tuple[VarData, ...] = ()
+    takes_over: tuple[tuple[ComplementarityData, ComplementarityData], ...] = ()
+    first_side_zero: tuple[ComplementarityData, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Pairs that change together between two places, one after the other.
+
+    Attributes
+    ----------
+    differing : tuple of (ComplementarityData, ComplementarityData)
+        a pair and its partner on the other side; the change is there if one of them has another zero side than its partner
+    later, earlier : tuple of (ComplementarityData, ComplementarityData or None)
+        the change comes one place later, or earlier, if each first pair takes the zero side that the second one has in the
+        solution; with None its first side becomes zero
+    """
+
+    differing: tuple[tuple[ComplementarityData, ComplementarityData], ...]
+    later: tuple[tuple[ComplementarityData, ComplementarityData | None], ...]
+    earlier: tuple[tuple[ComplementarityData, ComplementarityData | None], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Coincidence:
+    """Independent changes that may fall together in a solution although each of them could come before the others.
+
+    Where they do, the branches of all orders meet in the solution, and no small step leads into them: a certificate looks at each.
+
+    Attributes
+    ----------
+    changes : tuple of Change
+    later, earlier : VarData or None
+        the distance between changes if some come one place later, or earlier, than the rest: 0 in the solution, below its lower
+        bound; None where there is no such place
+    fixed : bool
+        whether they also fall together with something that does not move, so that one change alone matters too
+    """
+
+    changes: tuple[Change, ...]
+    later: VarData | None
+    earlier: VarData | None
+    fixed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Follower:
+    """A pair that has a solution wherever another one, its leader, is solved with the same side at zero.
+
+    Every branch gives it that side: its own values, which may be free, would choose at random.
+
+    Attributes
+    ----------
+    pair, leader : ComplementarityData
+    swapped : bool
+        whether the first side of one belongs to the second side of the other
+    """
+
+    pair: ComplementarityData
+    leader: ComplementarityData
+    swapped: bool = False
+
+
+class HomotopyHints(AutoSlots.Mixin):
+    """The hints on one block; ``mpec_hybrid`` without them solves the same problem, perhaps to a worse local solution.
+
+    Attributes
+    ----------
+    branch_constraints : list of BranchConstraint
+    penalties : list of Penalty
+    guide_bounds : ComponentMap Var -> (low, high)
+        tighter bounds of a Var (all its indices) in the homotopy.  Its own bounds belong to the method and not to the problem: a
+        certificate also asks for descent beyond them.
+    neighbour_branches : list of NeighbourBranch
+    coincidences : list of Coincidence
+    followers : list of Follower
+    alike : list of tuples of VarData
+        variables that are the same quantity at different places, and have one size
+    """
+
+    __slots__ = ('branch_constraints', 'penalties', 'guide_bounds', 'neighbour_branches', 'coincidences', 'followers', 'alike')
+
+    def __init__(self):
+        self.branch_constraints = []
+        self.penalties = []
+        self.guide_bounds = ComponentMap()
+        self.neighbour_branches = []
+        self.coincidences = []
+        self.alike = []
+        self.followers = []
+
+
+Block.register_private_data_initializer(HomotopyHints, scope=SCOPE)
+
+
+def homotopy_hints(block: Block) -> HomotopyHints:
+    """The hints of ``block``, to add to.
+
+    Parameters
+    ----------
+    block : Block
+        a scalar Block or one element of an indexed one, best the one that holds the components
+
+    Examples
+    --------
+    Two equal parts of a plant meet a demand.  Where both run (eta = x y > 0) they are to run alike, x = y.  As a pair
+    (x - y)^2 perp eta this degenerates at every solution, so the homotopy only prefers x = y and each branch imposes it:
+
+    >>> import pyomo.environ as pyo
+    >>> from pyomo.mpec import Complementarity, complements
+    >>> from pyomo_fesd.core import BranchConstraint, Penalty, homotopy_hints
+    >>> m = pyo.ConcreteModel()
+    >>> m.x, m.y = pyo.Var(bounds=(0, 4), initialize=1), pyo.Var(bounds=(0, 4), initialize=2)
+    >>> m.demand = pyo.Constraint(expr=m.x + m.y == 3)
+    >>> m.cost = pyo.Objective(expr=(m.x - 1) ** 2 + (m.y - 1.5) ** 2)
+    >>> m.alike = Complementarity(expr=complements((m.x - m.y) ** 2 >= 0, m.x * m.y >= 0))
+    >>> m.equal = pyo.Constraint(expr=m.x == m.y)
+    >>> m.equal.deactivate()
+    >>> m.difference = pyo.Expression(expr=(m.x - m.y) ** 2)
+    >>> hints = homotopy_hints(m)
+    >>> hints.branch_constraints.append(BranchConstraint(m.alike, m.equal))
+    >>> hints.penalties.append(Penalty(m.difference, 0.1))
+    >>> results = pyo.SolverFactory('mpec_hybrid').solve(m)
+    >>> print(f'{m.x.value:.3f} {m.y.value:.3f}')
+    1.500 1.500
+    """
+    return block.private_data(SCOPE)
+
+
+def all_hints(model: Block) -> HomotopyHints:
+    """The hints on ``model`` and the active blocks below it, in one record; writing to it changes none of them."""
+    total = HomotopyHints()
+    for hints in records_below(model, SCOPE):
+        total.branch_constraints += hints.branch_constraints
+        total.penalties += hints.penalties
+        total.guide_bounds.update(hints.guide_bounds)
+        total.neighbour_branches += hints.neighbour_branches
+        total.coincidences += hints.coincidences
+        total.alike += hints.alike
+        total.followers += hints.followers
+    return total

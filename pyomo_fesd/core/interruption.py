@@ -1,0 +1,96 @@
+"""Ctrl-C: at once where nothing is lost by it, and after the body where something would be left half done."""
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+
+#: Open contexts of the main thread.
+_open = []
+
+
+class DeferredInterrupt:
+    """Context in which Ctrl-C waits until the body has ended, so that what the body makes it also removes.
+
+    Then the handler of before gets the signal, which by default raises KeyboardInterrupt.
+
+    Does not apply: in other threads than the main one, which signals never interrupt, and where Ctrl-C is ignored.
+
+    Attributes
+    ----------
+    pressed : bool
+        whether a Ctrl-C is waiting
+
+    Examples
+    --------
+    >>> with DeferredInterrupt() as interrupt, tempfile.TemporaryDirectory() as folder, interrupt.raising():
+    ...     work(folder)
+    """
+
+    def __init__(self):
+        self.pressed, self._handler, self._raised = False, None, None
+
+    def __enter__(self):
+        if threading.current_thread() is threading.main_thread() and callable(signal.getsignal(signal.SIGINT)):
+            self._handler = signal.signal(signal.SIGINT, self._remember)
+            _open.append(self)
+        return self
+
+    def __exit__(self, kind, error, trace):
+        if self._handler is not None:
+            _open.remove(self)
+            signal.signal(signal.SIGINT, self._handler)
+            self._answer()
+
+    def _remember(self, *args):
+        self.pressed = True
+
+    def _raise(self, number, frame):
+        try:
+            self._handler(number, frame)
+        except BaseException as error:
+            self._raised = error
+            raise
+
+    def _answer(self):
+        if self.pressed:
+            self.pressed = False
+            self._handler(signal.SIGINT, None)
+
+    @contextmanager
+    def raising(self) -> Iterator[None]:
+        """Context inside the first one in which Ctrl-C does not wait.
+
+        Its end raises what a library has turned into another error, or what got lost in the deletion of a generator.
+        """
+        if self._handler is None:
+            yield
+            return
+        try:
+            signal.signal(signal.SIGINT, self._raise)
+            self._answer()
+            yield
+        finally:
+            signal.signal(signal.SIGINT, self._remember)
+            raised, self._raised = self._raised, None
+            if raised is not None:
+                raise raised
+            self._answer()
+
+
+def interruptible(function: Callable) -> Callable:
+    """Decorate ``function``: Ctrl-C raises KeyboardInterrupt, whatever the libraries that it calls make of it."""
+
+    @wraps(function)
+    def call(*args, **kwds):
+        with DeferredInterrupt() as interrupt, interrupt.raising():
+            return function(*args, **kwds)
+
+    return call
+
+
+def interrupt_handled() -> None:
+    """Note that a KeyboardInterrupt was caught on purpose: no context raises it again."""
+    for context in _open:
+        context._raised = None

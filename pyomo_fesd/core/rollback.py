@@ -1,0 +1,174 @@
+"""Restore the model as it was before a step that failed.
+
+Each function ``_remember_...`` records one aspect of the model and returns the function that restores it.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+
+from pyomo.common.collections import ComponentMap
+from pyomo.core import Block, BooleanVar, Constraint, Expression, Objective, Param, Set, Var
+from pyomo.core.base.set import FiniteSetData
+from pyomo.dae import ContinuousSet, DerivativeVar, Integral
+from pyomo.gdp import Disjunct
+from pyomo.mpec import Complementarity
+
+from pyomo_fesd.core.generated import is_generated
+from pyomo_fesd.core.interruption import DeferredInterrupt
+from pyomo_fesd.core.private_data import remember_records
+
+PLACES = (Block, Disjunct)
+#: Types of variables; the binaries of indicators come last, as they set the Booleans.
+VARIABLES = (BooleanVar, DerivativeVar, Var)
+#: Attributes that hold what a component states, by its type.
+STATEMENTS = {Constraint: 'expr', Objective: 'expr', Expression: 'expr', Complementarity: '_args'}
+
+
+@contextmanager
+def restored_on_error(block: Block, wrt: ContinuousSet | None = None) -> Iterator[None]:
+    """Remove points, indices, components, types and records that the body added to the model, if it raises.
+
+    Values, what is fixed, what is active and what components state are as before, too.  The error may be any: the body calls the
+    rules of the user's model, and Ctrl-C is one too.  It waits while the model is restored.
+
+    Parameters
+    ----------
+    wrt : ContinuousSet, optional
+        to which the body may add points
+    """
+    model = block.model()
+    with DeferredInterrupt() as interrupt, ExitStack() as undo:
+        # in reverse order of the restoration
+        undo.callback(_remember_types(model))
+        if wrt is not None:
+            undo.callback(_remember_points(wrt))
+        undo.callback(remember_records(model))
+        undo.callback(_remember_active(model))
+        undo.callback(_remember_indices(model))
+        undo.callback(_remember_values(model))
+        undo.callback(_remember_components(model))
+        undo.callback(_remember_statements(model))
+        with interrupt.raising():
+            yield
+        undo.pop_all()
+
+
+def _remember_values(model) -> Callable[[], None]:
+    found = (v for ctype in VARIABLES for v in model.component_data_objects(ctype, descend_into=PLACES))
+    variables = [(v, v.value, v.stale, v.fixed) for v in found]
+    params = (p for p in model.component_objects(Param, descend_into=PLACES) if p.mutable)
+    params = [(data, data._value) for p in params for data in p._data.values()]
+
+    def restore():
+        for v, value, _, fixed in variables:
+            if v.value != value:
+                v.set_value(value, skip_validation=True)
+            v.fixed = fixed
+        for v, _, stale, _ in variables:
+            v.stale = stale
+        for data, value in params:
+            data._value = value
+
+    return restore
+
+
+def _remember_statements(model):
+    """What Constraints, Objectives, named Expressions and Complementarities state."""
+    stated = [
+        (data, getattr(data, attribute, None))
+        for ctype, attribute in STATEMENTS.items()
+        for data in model.component_data_objects(ctype, descend_into=PLACES)
+    ]
+
+    def restore():
+        for data, content in stated:
+            if getattr(data, STATEMENTS[data.ctype], None) is not content:
+                data.set_value(content)
+
+    return restore
+
+
+def _remember_components(model):
+    names = ComponentMap((b, set(b.component_map())) for b in model.block_data_objects(descend_into=PLACES))
+
+    def restore():
+        for b, known in names.items():
+            for name in set(b.component_map()) - known:
+                b.del_component(name)
+
+    return restore
+
+
+def _remember_indices(model):
+    """Indices of components, and members of generated Sets."""
+    indices = ComponentMap((c, set(c._data)) for c in model.component_objects(descend_into=PLACES) if c.is_indexed())
+    sets = (s for s in model.component_objects(Set, descend_into=PLACES) if is_generated(s) and isinstance(s, FiniteSetData))
+    members = [(s, set(s)) for s in sets]
+
+    def restore():
+        for component, known in indices.items():
+            for index in set(component._data) - known:
+                del component._data[index]
+            component.__dict__.pop('_dae_missing_idx', None)
+        for s, known in members:
+            for member in set(s) - known:
+                s.remove(member)
+
+    return restore
+
+
+def _remember_active(model):
+    active = [(c, c.active) for c in model.component_data_objects(descend_into=PLACES) if hasattr(c, 'deactivate')]
+    active += [(c, c.active) for c in model.component_objects(descend_into=PLACES) if hasattr(c, 'deactivate')]
+    transformed = [(d, d._transformation_block) for d in model.component_data_objects(Disjunct, descend_into=PLACES)]
+
+    def restore():
+        for component, was in active:
+            component._active = was
+        for disjunct, block in transformed:
+            disjunct._transformation_block = block
+
+    return restore
+
+
+def _remember_points(wrt):
+    points, boundaries, info = list(wrt), list(wrt._fe), dict(wrt._discretization_info)
+
+    def restore():
+        for point in set(wrt) - set(points):
+            wrt.remove(point)
+        wrt._fe = boundaries
+        wrt.set_changed(False)
+        wrt._discretization_info.clear()
+        wrt._discretization_info.update(info)
+
+    return restore
+
+
+def _remember_types(model):
+    """DerivativeVars and Integrals, which become Vars and Expressions; Integrals are built again over the remaining points."""
+    # Pyomo's getter would make an expression of the original, which a clone of the model then keeps
+    derivatives = [(d, d.__dict__.get('_expr')) for d in model.component_objects(DerivativeVar, descend_into=PLACES)]
+    integrals = list(model.component_objects(Integral, descend_into=PLACES))
+
+    def restore():
+        for derivative, expression in derivatives:
+            derivative.__dict__.pop('_expr', None)
+            if expression is not None:
+                derivative.set_derivative_expression(expression)
+            _reclassify(derivative, DerivativeVar)
+        for integral in integrals:
+            if integral.ctype is Expression:
+                _reclassify(integral, Integral)
+                integral.clear()
+                integral._constructed = False
+                integral.construct()
+        for b in model.block_data_objects(descend_into=Block):
+            b.__dict__.pop('_pyomo_dae_reclassified_derivativevars', None)
+
+    return restore
+
+
+def _reclassify(component, ctype):
+    if component.ctype is not ctype:
+        component.parent_block().reclassify_component_type(component, ctype)

@@ -1,0 +1,230 @@
+"""Find the time in the index of a component: ``unit[a].hyb[0.5].dj['k']`` is split into 0.5 and the rest."""
+
+from collections import defaultdict
+
+from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.core import Block, Constraint, Var
+from pyomo.core.base.block import BlockData
+from pyomo.dae import ContinuousSet, DerivativeVar
+from pyomo.gdp import Disjunct
+
+from pyomo_fesd.core.errors import FesdError
+
+#: Endings of the names of pyomo.dae's own equations.
+DISCRETISATION = ('_disc_eq', '_cont_eq')
+
+
+def index_tuple(index) -> tuple:
+    """Return an index as a tuple: empty for a scalar, whose index is None."""
+    return () if index is None else index if isinstance(index, tuple) else (index,)
+
+
+def ancestry(data):
+    """Yield ``data`` and the blocks around it, from the inside out, without the model."""
+    while data is not None and data.parent_block() is not None:
+        yield data
+        data = data.parent_block()
+
+
+def index_sets(component) -> list:
+    """Return the sets that index a component itself, in their order."""
+    return list(component.index_set().subsets()) if component.is_indexed() else []
+
+
+def is_discretisation_equation(constraint) -> bool:
+    """Whether pyomo.dae has written a Constraint (or one of its data) for its discretisation."""
+    return constraint.parent_component().local_name.endswith(DISCRETISATION)
+
+
+def is_indexed_by(component, wrt) -> bool:
+    """Whether ``wrt`` is one of the index sets of ``component`` itself."""
+    return any(s is wrt for s in index_sets(component))
+
+
+def time_position(component, wrt) -> int | None:
+    """Position of ``wrt`` in the index tuple of ``component``; None if ``wrt`` does not index it.
+
+    An index set of unknown dimension before ``wrt`` counts as one position, as Pyomo's own sets do.
+    """
+    position = 0
+    for subset in index_sets(component):
+        if subset is wrt:
+            return position
+        position += subset.dimen or 1
+    return None
+
+
+class TimeIndex:
+    """Split the index of component data into the time label and the rest; the position in each component is found once.
+
+    Parameters
+    ----------
+    wrt : ContinuousSet
+
+    Example: with ``wrt = m.t``, ``split(m.unit['a'].hyb[0.5].dj)`` is ``(0.5, "unit[a].hyb[*].dj")``.
+    """
+
+    def __init__(self, wrt):
+        self.wrt = wrt
+        self._positions = ComponentMap()
+
+    def _position(self, component):
+        if component not in self._positions:
+            self._positions[component] = time_position(component, self.wrt)
+        return self._positions[component]
+
+    def split(self, data) -> tuple:
+        """Time label of ``data`` (None if it has none) and its name with ``*`` in place of the time."""
+        time, parts = None, []
+        for one in ancestry(data):
+            component = one.parent_component()
+            name, position = component.local_name, self._position(component)
+            if component.is_indexed():
+                index = index_tuple(one.index())
+                if position is not None:
+                    time, index = index[position], _replaced(index, position, '*')
+                name += '[' + ','.join(map(str, index)) + ']'
+            parts.append(name)
+        return time, '.'.join(reversed(parts))
+
+    def time(self, data):
+        """Time label of ``data``, or None."""
+        for one in ancestry(data):
+            position = self._position(one.parent_component())
+            if position is not None:
+                return index_tuple(one.index())[position]
+        return None
+
+    def at(self, data, label):
+        """The data of the same name at another time; None if ``data`` has no time."""
+        component = data.parent_component()
+        position = self._position(component)
+        if position is not None:
+            index = _replaced(index_tuple(data.index()), position, label)
+            return component[index if len(index) > 1 else index[0]]
+        block = data.parent_block()
+        other = None if block is None or block.parent_block() is None else self.at(block, label)
+        if other is None:
+            return None
+        found = other.component(component.local_name)
+        return found[data.index()] if component.is_indexed() else found
+
+    def families(self, datas) -> dict:
+        """Group ``datas`` by name: ``{"unit[a].hyb[*].dj": {time label: data}}``; data without time are left out."""
+        groups = defaultdict(dict)
+        for data in datas:
+            time, name = self.split(data)
+            if time is not None:
+                groups[name][time] = data
+        return dict(groups)
+
+
+def _replaced(index, position, new):
+    return (*index[:position], new, *index[position + 1 :])
+
+
+def strip_time(name: str) -> str:
+    """Remove the ``*`` of the time from a name: ``hyb[*].dj`` becomes ``hyb.dj``, ``dj[*,k]`` becomes ``dj[k]``."""
+    for full, short in (('[*]', ''), ('[*,', '['), (',*]', ']'), (',*,', ',')):
+        name = name.replace(full, short)
+    return name
+
+
+def refuse_foreign(variables, model, where) -> None:
+    """Refuse variables of another model: a rule that closes over ``m`` still refers to ``m`` when a clone of it is expanded.
+
+    Variables are accepted if ``where`` is a temporary block that holds blocks or constraints of their model, as initialisers make.
+
+    Raises
+    ------
+    FesdError
+        names the component of the other model
+    """
+    foreign = [c for c in ComponentSet(v.parent_component() for v in variables) if c.model() is not model]
+    held = _models_held(where) if foreign else ()
+    for component in foreign:
+        if component.model() not in held:
+            raise FesdError(
+                where,
+                f"it refers to '{component.name}' of another model (of which this one is perhaps a clone)",
+                "let rules take components from their own argument, e.g. d.model().x[t] instead of m.x[t], or transform before "
+                "cloning",
+            )
+
+
+def _models_held(block):
+    """The models that the blocks and constraints in ``block`` belong to."""
+    held = ComponentSet()
+    if isinstance(block, BlockData):
+        held.update(c.model() for c in block.component_data_objects((Block, Constraint), descend_into=Block))
+    return held
+
+
+def refuse_no_model(block, caller: str) -> None:
+    """Refuse what is not a model or a Block of one, and a model that has no data yet.
+
+    Raises
+    ------
+    FesdError
+    """
+    if not hasattr(block, 'component_objects'):
+        name = getattr(block, 'name', repr(block))
+        raise FesdError(name, f"{caller}: this is a {type(block).__name__}, not a model", "pass the model, or a Block of it")
+    if not block.model().is_constructed():
+        raise FesdError(
+            block, f"{caller}: the components of an abstract model have no data", "pass an instance: model.create_instance()"
+        )
+
+
+def find_continuous_set(block, wrt, caller: str) -> ContinuousSet:
+    """Return ``wrt`` after a check, or without ``wrt`` the only ContinuousSet below or above ``block``.
+
+    Raises
+    ------
+    FesdError
+        if ``block`` is no model, if ``wrt`` is not a ContinuousSet of the model, if there is none, or if there are several and
+        ``wrt`` was not given
+    """
+    refuse_no_model(block, caller)
+    if wrt is not None:
+        return _checked(wrt, block, caller)
+    levels = (ComponentSet(root.component_objects(ContinuousSet, descend_into=True)) for root in (block, block.model()))
+    found = next(filter(None, levels), ())
+    if len(found) == 1:
+        return next(iter(found))
+    if found:
+        cause, fix = f"several ContinuousSets ({', '.join(s.name for s in found)})", "say which one with the keyword wrt"
+    else:
+        cause, fix = "no ContinuousSet", "index the dynamic model by a pyomo.dae.ContinuousSet"
+    raise FesdError(block, f"{caller}: the model has {cause}", fix)
+
+
+def _checked(wrt, block, caller):
+    """``wrt`` if it is a ContinuousSet of the model of ``block``."""
+    if getattr(wrt, 'ctype', None) is not ContinuousSet:
+        raise FesdError(
+            getattr(wrt, 'name', str(wrt)),
+            f"{caller}: 'wrt' must be a pyomo.dae.ContinuousSet, not {type(wrt).__name__}",
+            "pass the time set, e.g. wrt=m.t; an IDAES flowsheet has one when built with dynamic=True",
+        )
+    if wrt.model() is not block.model():
+        raise FesdError(wrt, f"{caller}: this ContinuousSet belongs to another model than '{block.name}'", "pass the model's own")
+    return wrt
+
+
+def derivatives(block, wrt):
+    """Yield every DerivativeVar with respect to ``wrt`` below ``block``, also after discretisation made it a plain Var."""
+    for var in block.component_objects((Var, DerivativeVar), descend_into=(Block, Disjunct)):
+        if isinstance(var, DerivativeVar) and any(s is wrt for s in var.get_continuousset_list()):
+            yield var
+
+
+def discretised(wrt) -> bool:
+    """Whether pyomo.dae has discretised ``wrt``."""
+    return 'scheme' in wrt.get_discretization_info()
+
+
+def continuous_sets(data) -> ComponentSet:
+    """The ContinuousSets that index ``data`` or a block around it."""
+    sets = (s for one in ancestry(data) for s in index_sets(one.parent_component()))
+    return ComponentSet(s for s in sets if s.ctype is ContinuousSet)

@@ -1,0 +1,48 @@
+"""The step function of an expression c, from which the Heaviside form and all functions that jump are made (theory, eq. 5).
+
+    c = p - n,    0 <= alpha  perp  n >= 0,    0 <= 1 - alpha  perp  p >= 0
+
+so alpha is 1 where c > 0 and 0 where c < 0; p = max(0, c) and n = max(0, -c) are continuous in time where c is.
+
+Takes: a block of its own, and c as an expression.
+Leaves: ``alpha``, ``p``, ``n``, ``switching`` (c = p - n) and ``complementarity`` (its last index: 1 and 2) on that block.
+Does not apply: to continuous piecewise functions, which need one variable only (``core/positive_part.py``).
+"""
+
+from pyomo.core import Constraint, Var
+from pyomo.core.base.block import BlockData
+from pyomo.core.base.var import VarData
+from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd.core import Step, switched_systems, value_or_zero
+
+
+def declare_step(block: BlockData, *sets) -> None:
+    """Declare the components on ``block`` over the ``sets`` (without sets: as scalars)."""
+    sparse = {'dense': False} if sets else {}
+    block.alpha = Var(*sets, **sparse, bounds=(0, 1))
+    block.p = Var(*sets, **sparse, bounds=(0, None))
+    block.n = Var(*sets, **sparse, bounds=(0, None))
+    block.switching = Constraint(*sets)
+    block.complementarity = Complementarity(*sets, [1, 2])
+    systems = switched_systems(block)
+    systems.selectors.add(block.alpha)
+    systems.continuous[block.p] = systems.continuous[block.n] = block.switching
+
+
+def add_step(block: BlockData, index: tuple, c, lean: float = 0.0) -> VarData:
+    """Add the step function of c at ``index`` (empty for a scalar) and return alpha.
+
+    Parameters
+    ----------
+    lean : float
+        alpha starts at 1/2, changed by ``lean`` towards the side of c at the present values
+    """
+    alpha, p, n = (variable[index or None] for variable in (block.alpha, block.p, block.n))
+    now = float(value_or_zero(c))  # start values may be numpy numbers, whose comparisons cannot be subtracted
+    alpha.value, p.value, n.value = 0.5 + lean * ((now > 0) - (now < 0)), max(now, 0.0), max(-now, 0.0)
+    block.switching.add(index or None, c == p - n)
+    block.complementarity.add((*index, 1), complements(alpha >= 0, n >= 0))
+    block.complementarity.add((*index, 2), complements(1 - alpha >= 0, p >= 0))
+    switched_systems(block).steps.append(Step(alpha, c))
+    return alpha

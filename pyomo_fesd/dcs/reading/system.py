@@ -1,0 +1,135 @@
+"""Read one Disjunction at one time: its modes, its regions, and the variables that the modes define."""
+
+from dataclasses import dataclass
+from itertools import chain
+
+from pyomo.common.collections import ComponentSet
+from pyomo.core.expr.visitor import identify_variables
+
+from pyomo_fesd.core import Swap, expression_key, refuse_foreign
+from pyomo_fesd.dcs.reading.disjunction_tree import DisjunctionTree
+from pyomo_fesd.dcs.reading.mode_contents import refuse_contents, refuse_defined_in_regions, refuse_derivatives_in_regions
+from pyomo_fesd.dcs.reading.mode_domains import read_laws
+from pyomo_fesd.dcs.reading.mode_equations import ModeEquations, read_equations
+from pyomo_fesd.dcs.reading.regions import Regions, conditions, read_regions
+
+
+@dataclass(frozen=True)
+class ModeSystem:
+    """One DisjunctionData as a system of modes.
+
+    Attributes
+    ----------
+    tree : DisjunctionTree
+        the Disjunction with those nested in it
+    modes : list of Mode
+        the modes that can be active (a deactivated disjunct or one whose indicator is fixed to False is left out)
+    regions : Regions or None
+        None also where the regions may overlap (hysteresis)
+    equations : ModeEquations or None
+        both None where only one mode is left, whose constraints are imposed as they are
+    laws : list of lists of Law
+        by mode, how its right-hand sides (or its equations, where it is implicit) are continued outside of its region
+    """
+
+    tree: DisjunctionTree
+    modes: list
+    regions: Regions | None
+    equations: ModeEquations | None
+    laws: list
+
+    @property
+    def disjunction(self):
+        """The outermost DisjunctionData."""
+        return self.tree.disjunction
+
+
+@dataclass(frozen=True)
+class HysteresisSystem(ModeSystem):
+    """One DisjunctionData whose last mode goes on where regions overlap.
+
+    Attributes
+    ----------
+    conditions : list of lists of expressions
+        for each mode the c_ik of its region c_ik >= 0
+    """
+
+    conditions: list
+
+
+class SystemReader:
+    """Reads Disjunctions of one model; the analysis of one is reused for all that are built alike.
+
+    Parameters
+    ----------
+    variables : TimeVariables
+    times : TimeIndex
+    """
+
+    def __init__(self, variables, times):
+        self._variables, self._times = variables, times
+        self._patterns, self._choices = {}, {}
+        self._read, self._own = {}, ComponentSet()
+
+    def read(self, tree, modes) -> ModeSystem:
+        """Read the ``modes`` that are left of a tree; the model is not changed."""
+        refuse_contents(tree, modes)
+        if len(modes) == 1:
+            return ModeSystem(tree, modes, None, None, [])
+        equalities, inequalities = _split_constraints(modes)
+        counts = tuple(map(len, equalities)), tuple(map(len, inequalities))
+        key, parts = expression_key(
+            [con.expr for con in chain(*equalities, *inequalities)],
+            lambda v: (self._variables.is_derivative(v), self._variables.is_state(v), v.lb, v.ub),
+        )
+        self._refuse_foreign(tree, modes, [*equalities, *inequalities], parts)
+        if (counts, key) in self._read:
+            first, others = self._read[counts, key]
+            swap = Swap(others, parts)
+            regions = Regions([swap.expression(c) for c in first.regions.functions], first.regions.geometry)
+            return ModeSystem(tree, modes, regions, first.equations.swapped(swap, equalities), first.laws)
+        system = self._study(tree, modes, equalities, inequalities)
+        if key is not None:
+            self._read[counts, key] = system, parts
+        return system
+
+    def read_hysteresis(self, tree, modes) -> HysteresisSystem:
+        """Read two or more modes whose regions may overlap, leave gaps, or have no condition."""
+        refuse_contents(tree, modes)
+        equalities, inequalities = _split_constraints(modes)
+        self._refuse_foreign(tree, modes, [*equalities, *inequalities])
+        equations = self._equations(tree.disjunction, modes, equalities, inequalities)
+        stated = [[c for con in cons for c in conditions(con)] for cons in inequalities]
+        refuse_defined_in_regions(tree.disjunction, chain(*stated), equations)
+        laws = read_laws(modes, equations, [list(enumerate(cs)) for cs in stated])
+        return HysteresisSystem(tree, modes, None, equations, laws, stated)
+
+    def _study(self, tree, modes, equalities, inequalities):
+        """Regions and equations of a Disjunction with a new key."""
+        equations = self._equations(tree.disjunction, modes, equalities, inequalities)
+        patterns = self._patterns.setdefault(self._times.split(tree.disjunction)[1], {})
+        regions = read_regions(tree.disjunction, modes, inequalities, patterns)
+        refuse_defined_in_regions(tree.disjunction, regions.functions, equations)
+        return ModeSystem(tree, modes, regions, equations, read_laws(modes, equations, regions.conditions()))
+
+    def _equations(self, disjunction, modes, equalities, inequalities):
+        refuse_derivatives_in_regions(inequalities, self._variables)
+        choice = self._choices.setdefault(self._times.split(disjunction)[1], {})
+        return read_equations(disjunction, modes, equalities, self._variables, choice)
+
+    def _refuse_foreign(self, tree, modes, constraints, parts=()):
+        """Refuse variables of another model; ``parts`` are all components of the constraints, if they are known."""
+        # units of measure are among the parts, and belong to no model
+        components = ComponentSet(part.parent_component() for part in parts if hasattr(part, 'parent_component'))
+        if components and components <= self._own:
+            return
+        for mode, cons in zip([*modes, *modes], constraints):
+            mentioned = (v for con in cons for v in identify_variables(con.body))
+            refuse_foreign(mentioned, tree.disjunction.model(), mode)
+        self._own |= components
+
+
+def _split_constraints(modes):
+    """The equalities and the inequalities of each mode."""
+    constraints = [list(mode.constraints()) for mode in modes]
+    return [[c for c in cons if c.equality] for cons in constraints], [[c for c in cons if not c.equality] for cons in constraints]

@@ -1,0 +1,132 @@
+"""Write a dynamic complementarity system: once when ``fesd.dcs`` is applied, and again at the times that follow."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+
+from pyomo.common.collections import ComponentSet
+from pyomo.common.gc_manager import PauseGC
+from pyomo.core import Block
+from pyomo.core.base.block import BlockData
+from pyomo.gdp import Disjunction
+
+from pyomo_fesd.core import FesdError, TimeIndex, TimeWriter
+from pyomo_fesd.dcs.blending import blend, dcs_block
+from pyomo_fesd.dcs.exclusion_pairs import write_exclusions
+from pyomo_fesd.dcs.forms import heaviside, hysteresis, stewart
+from pyomo_fesd.dcs.piecewise import PiecewiseRewriter
+from pyomo_fesd.dcs.reading import (
+    Nesting,
+    SystemReader,
+    modes_left,
+    read_exclusions,
+    read_logic,
+    refuse_twice_defined,
+)
+from pyomo_fesd.dcs.source_maps import defined_variables
+from pyomo_fesd.dcs.time_variables import TimeVariables
+
+#: The forms: 'auto' takes the smallest that applies, the first of those as small.
+FORMS = {form.NAME: form for form in (stewart, heaviside)}
+
+
+class DcsWriter(TimeWriter):
+    """One application of ``fesd.dcs``.
+
+    Attributes
+    ----------
+    targets : list of components
+    form : str
+    hysteresis : list of components
+        Disjunctions (or Blocks) whose modes have hysteresis
+    defines : list of Var or VarData
+        variables that modes define
+    """
+
+    __slots__ = ('targets', 'form', 'hysteresis', 'defines')
+
+    def __init__(self, block, wrt, targets, form, hysteresis, defines):
+        super().__init__(_one_block(block), wrt)
+        self.targets, self.form, self.hysteresis, self.defines = targets or [block], form, hysteresis, defines
+
+    def write(self) -> None:
+        """Write every Disjunction and piecewise function that is active at some time, and deactivate it."""
+        model, times, defined = self.block.model(), TimeIndex(self.wrt), defined_variables(self.block)
+        with_hysteresis = ComponentSet(_disjunctions(model, self.hysteresis))
+        nesting = Nesting(model, times, with_hysteresis)
+        found = nesting.outermost(_disjunctions(model, self.targets), self.targets)
+        reader = SystemReader(TimeVariables(model, self.wrt, self.defines), times)
+        with PauseGC(), ExitStack() as undo:
+            PiecewiseRewriter(self.block, times, undo).replace_all([*_blocks(self.targets), *self._disjuncts(found)])
+            trees = [nesting.tree(d) for d in found]
+            propositions = read_logic(_blocks(self.targets), trees, times)
+            modes = modes_left(trees, propositions)
+            systems = [_read_system(reader, tree, modes[tree], tree.disjunction in with_hysteresis) for tree in trees]
+            refuse_twice_defined(systems, defined)
+            exclusions = read_exclusions(propositions, systems)
+            forms = [_form(self.form, system) for system in systems]
+            undo.pop_all()
+            weights = {system.tree: blend(system, form, defined) for system, form in zip(systems, forms)}
+            for proposition in propositions:
+                write_exclusions(dcs_block(proposition.constraint.parent_block()), proposition, exclusions, weights)
+
+    def _disjuncts(self, disjunctions):
+        """The active disjuncts, where Disjunctions are among the targets: no block of the targets need contain them."""
+        named = any(target.ctype is Disjunction for target in self.targets)
+        return [disjunct for d in disjunctions if named for disjunct in d.disjuncts if disjunct.active]
+
+    def integrand(self, owner) -> Callable:
+        """Return a function that replaces the piecewise functions of an integrand of ``owner``."""
+        rewriter = PiecewiseRewriter(self.block, TimeIndex(self.wrt), ExitStack())
+        return lambda expression: rewriter.replaced(expression, owner)
+
+
+def _one_block(instance):
+    """The block that holds the components common to all of ``instance``."""
+    return instance if isinstance(instance, BlockData) else instance.parent_block()
+
+
+def _blocks(targets):
+    """The blocks among the targets, one by one."""
+    for target in targets:
+        if target.ctype is Block:
+            yield from target.values() if not isinstance(target, BlockData) else [target]
+
+
+def _read_system(reader, tree, modes, with_hysteresis):
+    """Read one system; a single mode needs no hysteresis."""
+    if not with_hysteresis or len(modes) == 1:
+        return reader.read(tree, modes)
+    hysteresis.refuse_ambiguous(tree.disjunction, modes)
+    return reader.read_hysteresis(tree, modes)
+
+
+def _form(name, system):
+    """The form that the keyword ``form`` names; None where one mode is left."""
+    if len(system.modes) == 1:
+        return None
+    if hysteresis.applies(system):
+        return hysteresis
+    if name == 'auto':
+        return min((form for form in FORMS.values() if form.applies(system)), key=lambda form: form.count(system))
+    form = FORMS[name]
+    if not form.applies(system):
+        raise FesdError(system.disjunction, f"form='{name}' does not fit: {form.why_not(system)}", "use form='auto'")
+    return form
+
+
+def _disjunctions(model, targets):
+    """Active DisjunctionData of the targets, in declaration order."""
+    for target in targets:
+        if target.model() is not model:
+            raise FesdError(target, "fesd.dcs: this target belongs to another model", "give a component of the model itself")
+        if target.ctype is Disjunction:
+            yield from (d for d in (target.values() if hasattr(target, 'values') else [target]) if d.active)
+        elif target.ctype is Block:
+            for block in _blocks([target]):
+                yield from block.component_data_objects(Disjunction, active=True, descend_into=Block)
+        else:
+            raise FesdError(
+                target,
+                f"fesd.dcs: a target must be a Block or a Disjunction, not a {target.ctype.__name__}",
+                "give the block that holds the Disjunction, or the Disjunction itself",
+            )

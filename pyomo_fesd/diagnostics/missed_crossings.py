@@ -1,0 +1,155 @@
+"""Missed crossings: between collocation points, an element's polynomials leave the region of its mode, condition or guard.
+
+Two crossings between neighbouring collocation points leave no trace in the signs at these points.
+
+After a slide that ends smoothly (its multiplier has arrived at that of the next element, so the function leaves zero without a
+slope), the error of the polynomials decides their sign next to the boundary: there a wrong one tells nothing.
+
+Takes: a solved model with a moving grid.
+Leaves: messages.
+Does not apply: to sides of a hand-written Complementarity.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from pyomo.common.collections import ComponentMap
+from pyomo.core import Block, value
+from pyomo.core.expr.visitor import identify_variables
+from pyomo.dae import ContinuousSet
+from scipy.interpolate import BarycentricInterpolator
+
+from pyomo_fesd.core import interpolation_weights, kept_values, moving_grids
+from pyomo_fesd.results import SwitchingFunction, jumps_that_happen, largest_value
+
+#: A function below this part of its largest value is zero all along an element.
+ZERO = 1e-7
+#: A missed crossing counts if it is larger than this part of the function's largest value in the element.
+SIGNIFICANT = 1e-6
+#: A slide ends smoothly if its multiplier arrives within this distance of its value in the next element.
+ARRIVED = 1e-2
+#: Relative times at which a function is evaluated, and those between them at which its interpolant is.
+NODES = (1 - np.cos(np.pi * (np.arange(12) + 0.5) / 12)) / 2
+INSIDE = np.linspace(0.0, 1.0, 202)[1:-1]
+
+
+def missed_crossings(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
+    """Yield messages for elements in which a function has the wrong sign between collocation points."""
+    moving = moving_grids(model)[wrt]
+    time, after = moving.physical_time(), _values_after_jumps(model, wrt)
+    for f in _kept(moving, functions):
+        found = next(filter(None, (_crossing(f, element, moving.grid, after) for element in moving.grid.elements)), None)
+        if found is not None:
+            element, crossing = found
+            when = time[element.left] + crossing * (time[element.right] - time[element.left])
+            yield (
+                f"{f.name}: near time {when:.6g} the solution leaves its region between two collocation points and comes back, "
+                "which the elements do not detect. Take more elements (nfe)."
+            )
+
+
+def _values_after_jumps(model, wrt):
+    """Element number -> the states that jump at its left boundary, with their values after the jump."""
+    return {before.n + 1: ComponentMap(values) for before, _, _, values in jumps_that_happen(model, wrt)}
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """A function that has one sign in an element.
+
+    Attributes
+    ----------
+    name : str
+    by_label : dict label -> expression
+    sign : callable (kept, element) -> 1, -1, or 0 where the function slides or is not kept
+    nu : dict label -> VarData or None
+        the multiplier of a switching function
+    """
+
+    name: str
+    by_label: dict
+    sign: Callable
+    nu: dict | None = None
+
+    @cached_property
+    def numbers(self):
+        """Values by label."""
+        return {label: value(function) for label, function in self.by_label.items()}
+
+    @cached_property
+    def zero(self):
+        """The size below which the function is zero."""
+        return ZERO * largest_value(self.numbers)
+
+    def leaves_smoothly(self, element, grid):
+        """Whether a slide ends at the left boundary of ``element`` and its multiplier arrives there."""
+        if self.nu is None or element.n == 1:
+            return False
+        before = grid.elements[element.n - 2]
+        if self.sign(self, before) or any(t not in self.nu for t in (*before.points, element.points[0])):
+            return False
+        weights = interpolation_weights(grid.tau, np.ones(len(grid.tau)))
+        end = sum(weight * self.nu[t].value for weight, t in zip(weights, before.points))
+        return abs(end - self.nu[element.points[0]].value) <= ARRIVED
+
+
+def _kept(moving, functions):
+    """Switching functions, conditions of modes with hysteresis, and guards."""
+    for s in functions:
+        yield _Kept(s.name, s.c, _sign, s.nu)
+    for mode in [] if moving.hysteresis is None else moving.hysteresis.modes:
+        for k in range(min(map(len, mode.conditions.values()))):
+            by_label = {t: conditions[k] for t, conditions in mode.conditions.items()}
+            yield _Kept(mode.title, by_label, lambda _, element, mode=mode: int(value(mode.weight(element)) > 0.5))
+    for jump in [] if moving.state_jumps is None else moving.state_jumps.laws:
+        yield _Kept(jump.name, jump.guards, lambda _, element: 1)
+
+
+def _sign(kept, element):
+    """The sign of c at the collocation points of an element; 0 if it slides."""
+    largest = max((kept.numbers[t] for t in element.points if t in kept.numbers), key=abs, default=0.0)
+    return 0 if abs(largest) <= kept.zero else int(np.sign(largest))
+
+
+def _crossing(kept, element, grid, after):
+    """The element and the relative time at which sign c is clearly negative inside it; None if it is not."""
+    labels, sign = (element.left, *element.points), kept.sign(kept, element)
+    if sign == 0 or any(t not in kept.by_label for t in labels):
+        return None
+    at_points = np.array([sign * kept.numbers[t] for t in element.points])
+    largest = np.abs(at_points).max()
+    if largest <= kept.zero or at_points.min() > 2 * np.ptp(at_points):
+        return None  # zero throughout, or far from zero
+    functions, jumping = [kept.by_label[t] for t in labels], after.get(element.n, ComponentMap())
+    at_nodes = _interpolated_between_points(functions, np.array([0.0, *grid.tau]), jumping)
+    values = sign * BarycentricInterpolator(NODES, at_nodes)(INSIDE)
+    if kept.leaves_smoothly(element, grid):
+        values = np.where(np.logical_or.accumulate(values >= 0), values, 0.0)
+    worst = int(np.argmin(values))
+    return (element, INSIDE[worst]) if values[worst] < -SIGNIFICANT * max(largest, np.abs(values).max()) else None
+
+
+def _interpolated_between_points(functions, tau, after):
+    """A function at the relative times ``NODES``, its variables interpolated between the points of an element.
+
+    Parameters
+    ----------
+    functions : list of expressions
+        the function at the left boundary and at the collocation points
+    tau : array
+        their relative times
+    after : ComponentMap
+        values on the left of states that have just jumped
+    """
+    rows = [list(identify_variables(f, include_fixed=True)) for f in functions]
+    points = [[after.get(v, v.value) for v in rows[0]], *([v.value for v in row] for row in rows[1:])]
+    polynomials = [BarycentricInterpolator(tau, column)(NODES) for column in zip(*points)]
+    found = []
+    with kept_values(rows[-1]):
+        for at_node in zip(*polynomials) if polynomials else [()] * len(NODES):
+            for v, number in zip(rows[-1], at_node):
+                v.set_value(number, skip_validation=True)
+            found.append(value(functions[-1]))
+    return np.array(found)

@@ -1,0 +1,51 @@
+"""Post-solve diagnostics that the certificate does not cover."""
+
+import logging
+
+from pyomo.core import Block
+
+from pyomo_fesd.core import moving_grids
+from pyomo_fesd.diagnostics.collapsed_elements import collapsed_elements
+from pyomo_fesd.diagnostics.missed_crossings import missed_crossings
+from pyomo_fesd.diagnostics.uneven_elements import uneven_elements
+from pyomo_fesd.diagnostics.uniqueness import not_unique
+from pyomo_fesd.results import switching_functions
+
+logger = logging.getLogger('pyomo_fesd')
+
+#: Functions ``(model, wrt, switching functions)`` that yield messages, by what they look for.
+CHECKS = {
+    'uniqueness': not_unique,
+    'missed crossings': missed_crossings,
+    'collapsed elements': collapsed_elements,
+    'uneven elements': uneven_elements,
+}
+
+
+def diagnose(model: Block) -> list[str]:
+    """Log warnings about missed crossings, collapsed and uneven elements, and solutions that are not unique; return the messages.
+
+    Called by ``mpec_hybrid`` and ``simulate`` for the moving grids on the Block that they solve.
+    """
+    grids = [wrt for wrt, moving in moving_grids(model).items() if _lies_on(moving.block, model)]
+    messages = []
+    for wrt in grids:
+        messages += [message for name, check in CHECKS.items() for message in _messages(name, check, model, wrt)]
+    for message in messages:
+        logger.warning(message)
+    return messages
+
+
+def _messages(name, check, model, wrt):
+    """The messages of one check; one line if it fails, since no review may cost a result."""
+    try:
+        return list(check(model, wrt, switching_functions(model, wrt)))
+    except Exception as error:
+        reason = ' '.join(str(error).split()) or type(error).__name__
+        return [f"{wrt.name}: the solution stands, but it was not reviewed for {name}: {reason}"]
+
+
+def _lies_on(block, model):
+    while block is not None and block is not model:
+        block = block.parent_block()
+    return block is model

@@ -1,0 +1,151 @@
+"""Solutions that are not unique: on a surface from which both modes lead away, a Filippov system can stay or leave at any time.
+
+With the rate cdot of the switching function, and nu the multiplier of the mode where c > 0, this happens where
+
+    cdot(nu = 1) > 0 > cdot(nu = 0)
+
+at the first time with c = 0, or in a sliding mode (which then repels).
+
+Takes: a solved model with a moving grid.
+Leaves: messages.
+Does not apply: to switching functions that contain algebraic variables, where several surfaces meet, and where the equations do
+not determine the rates by nu alone.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+import numpy as np
+from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.core import Block, Constraint, value
+from pyomo.core.expr.visitor import identify_variables
+from pyomo.dae import ContinuousSet
+from scipy.sparse import csr_matrix
+from scipy.sparse.linalg import lsqr
+
+from pyomo_fesd.core import (
+    TimeIndex,
+    all_switched_systems,
+    derivatives,
+    gradient,
+    is_discretisation_equation,
+    moving_grids,
+)
+from pyomo_fesd.results import SwitchingFunction, largest_value, physical_time
+
+#: A switching function below this part of its largest value is zero; a multiplier farther than this from 0 and 1 slides.
+ZERO, SLIDING = 1e-7, 1e-6
+#: Accuracy of the linear equations, and of a system that counts as solved; a smaller change, relative to the largest, is none.
+EXACT, SOLVED, CHANGES = 1e-10, 1e-6, 1e-9
+
+
+def not_unique(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
+    """Yield messages for boundaries from which both modes lead away."""
+    grid, time, rates = moving_grids(model)[wrt].grid, None, None
+    for s in functions:
+        for label, slides in _meetings(s, grid, wrt):
+            rates = rates or _Rates(model, wrt)
+            rate, slope, nu = *rates.of(s, label), s.nu[label].value
+            if slope > 0 and (slides or rate + (1 - nu) * slope > 0 > rate - nu * slope):
+                time = time or physical_time(model, wrt)
+                yield (
+                    f"{s.name}: at time {time[label]:.6g} both modes lead away from their boundary: the solution is "
+                    "not unique, it may stay there or leave at any time. One of them is shown. Start off the boundary."
+                )
+                break
+
+
+def _meetings(s, grid, wrt):
+    """``(label, whether it slides)`` where c = 0 and either mode is possible: the first time, and where a slide begins."""
+    first, before, zero = wrt.first(), False, ZERO * largest_value(s.c)
+    if first in s.c and abs(value(s.c[first])) <= zero:
+        yield first, False
+    for element in grid.elements:
+        label = element.points[0]
+        slides = label in s.c and SLIDING < s.nu[label].value < 1 - SLIDING and abs(value(s.c[label])) <= zero
+        if slides and not before:
+            yield label, True
+        before = slides
+
+
+class _Rates:
+    """Rates of switching functions, by the equations at a label."""
+
+    def __init__(self, model, wrt):
+        self._rates = ComponentMap((d.get_state_var(), d) for d in derivatives(model, wrt))
+        systems, moving = all_switched_systems(model), moving_grids(model)[wrt]
+        held = [v for c in (moving.held or {}).values() for v in identify_variables(c.body)]
+        self._given = ComponentSet([*systems.selectors, *systems.continuous, *held])
+        self._conditions = moving.complementarities
+        self._rows, self._linear, times = defaultdict(list), {}, TimeIndex(wrt)
+        for c in model.component_data_objects(Constraint, active=True, descend_into=Block):
+            if c.equality and not is_discretisation_equation(c):
+                self._rows[times.time(c)].append(c)
+
+    def of(self, s, label):
+        """Return cdot and d cdot/d nu at ``label``; (0, 0) if they are not determined by states and equations."""
+        variables = list(identify_variables(s.c[label], include_fixed=True))
+        if not variables or any(v.parent_component() not in self._rates for v in variables):
+            return 0.0, 0.0
+        slopes = gradient(s.c[label], variables)
+        rates = [self._rates[v.parent_component()][v.index()] for v in variables]
+        slope = self._slope(label, s.nu[label], rates, slopes)
+        return (0.0, 0.0) if slope is None else (sum(g * r.value for g, r in zip(slopes, rates)), slope)
+
+    def _slope(self, label, nu, rates, gradient):
+        """sum_j gradient_j d rate_j/d nu by the implicit function theorem; None if the equations do not determine it.
+
+        They do not where other variables are free, where other multipliers have to change with nu, and where a condition
+        depends on the change: its active side may change too.
+        """
+        if label not in self._linear:
+            self._linear[label] = self._linearised(label)
+        columns, J, others = self._linear[label]
+        if not columns:
+            return 0.0
+        right, wanted = np.zeros(J.shape[0]), np.zeros(J.shape[1])
+        for row, entry in others.get(id(nu), ()):
+            right[row] -= entry
+        for rate, g in zip(rates, gradient):
+            if rate in columns:
+                wanted[columns[rate]] += g
+        change, multipliers = _solve(J, right), _solve(J.T, wanted)
+        if change is None or multipliers is None or self._reaches_conditions(label, columns, change):
+            return None
+        return float(multipliers @ right)
+
+    def _reaches_conditions(self, label, columns, change):
+        """Whether a side of a condition at ``label`` contains an unknown that changes."""
+        sides = (side for c in self._conditions for side in c.sides.get(label, ()))
+        found = (v for side in sides for v in identify_variables(side))
+        largest = np.abs(change).max()
+        return any(v in columns and abs(change[columns[v]]) > CHANGES * largest for v in found)
+
+    def _linearised(self, label):
+        """Columns and Jacobian of the unknowns in the equations at ``label``; by id, rows and entries of the other variables."""
+        columns, entries, others, number = ComponentMap(), [], defaultdict(list), 0
+        for c in self._rows[label]:
+            variables = list(identify_variables(c.body))
+            unknown = [self._unknown(v) for v in variables]
+            if not any(unknown):
+                continue
+            for v, g, is_unknown in zip(variables, gradient(c.body, variables), unknown):
+                if is_unknown:
+                    entries.append((g, number, columns.setdefault(v, len(columns))))
+                else:
+                    others[id(v)].append((number, g))
+            number += 1
+        if not entries:
+            return columns, None, others
+        numbers, rows, cols = zip(*entries)
+        return columns, csr_matrix((numbers, (rows, cols)), shape=(number, len(columns))), others
+
+    def _unknown(self, v):
+        component = v.parent_component()
+        return component not in self._rates and v not in self._given and component not in self._given
+
+
+def _solve(A, b):
+    """A least-norm solution of A x = b; None if there is none."""
+    x = lsqr(A, b, atol=EXACT, btol=EXACT)[0]
+    return x if np.abs(A @ x - b).max(initial=0.0) <= SOLVED * np.abs(b).max(initial=0.0) else None

@@ -1,0 +1,18 @@
+"""``fesd.finite_elements``: collocation on elements with variable lengths, whose boundaries find the switches.
+
+The transformation reads the switched systems that other transformations recorded, discretises with pyomo.dae, and writes a
+``MovingGrid``.  Read its files in this order:
+
+- ``transformation`` calls all others, in the order of its ``_apply_to``; ``options`` declares its keywords
+- ``expansion``, ``collocation``: pyomo.dae's discretisation, also of Disjuncts
+- ``lengths``, ``free_time``, ``quadrature``, ``controls``: time on moving elements
+- ``time_complementarities``, ``mixed_complementarity``, ``continuity``, ``algebraic_graph``: conditions and their continuity
+- ``cross_complementarity``, ``state_jumps``, ``hysteresis``, ``right_limits``, ``mode_limits``: the laws of switching
+- ``equilibration``, ``sliding_exit``, ``neighbour_branches``, ``coincidences``: the lengths, and hints for the homotopy
+- ``given_inputs``, ``explicit_time``, ``untaken_kinks``, ``spatial_sets``: inputs, warnings and refusals
+"""
+
+from pyomo_fesd.finite_elements import transformation
+from pyomo_fesd.finite_elements.equilibration import TINY
+from pyomo_fesd.finite_elements.hysteresis import LEFT, RIGHT
+from pyomo_fesd.finite_elements.lengths import LEAST

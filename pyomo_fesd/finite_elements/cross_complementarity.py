@@ -1,0 +1,143 @@
+"""Cross complementarity: an active set that does not change inside an element (theory, eq. 11).
+
+Takes: the time complementarities.
+Leaves: ``cross`` (aggregated pairs by condition and element), ``nonnegative`` and ``sign_after`` (signs of sides that bounds do not
+imply), ``left_limit`` (Gauss only); the sources are deactivated, except at the first time, where they are imposed unchanged.
+Does not apply: to complementarities without time.
+"""
+
+from collections.abc import Iterator
+
+from pyomo.common.collections import ComponentSet
+from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
+from pyomo.core import Constraint, ConstraintList, RangeSet, Set, quicksum
+from pyomo.core.expr.visitor import identify_variables
+from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd.core import Follower, MovingGrid, all_switched_systems, homotopy_hints, is_generated, mutable_parameters
+from pyomo_fesd.finite_elements.mixed_complementarity import repeats_other_side
+from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
+
+#: The three forms of eq. (11), with the number of point indices of each pair.
+FORMS = {'element': 0, 'point': 1, 'full': 2}
+
+
+def add_cross_complementarity(moving: MovingGrid, conditions: list[TimeComplementarity], form: str) -> None:
+    """Add the aggregated pairs and deactivate their sources."""
+    block, grid = moving.block, moving.grid
+    moving.complementarities = list(conditions)
+    block.condition = Set(initialize=[c.name for c in conditions], ordered=True)
+    points = RangeSet(len(grid.tau) + 2)  # the collocation points, and both boundaries of a continuous side
+    block.cross = moving.pairs = Complementarity(block.condition, block.element, *[points] * FORMS[form])
+    for condition in conditions:
+        for element in grid.elements:
+            for index, (G, H) in _pairs(condition, element, form):
+                pair = block.cross.add((condition.name, element.n, *index), complements(G >= 0, H >= 0))
+                moving.sources[pair] = [moving.source(condition.conditions[t]) for t in condition.points(element)]
+    _lead_first_time(moving, form)
+    _add_signs(moving)
+    if not grid.right_is_collocated:
+        _equate_left_limits(moving)
+    for condition in conditions:
+        for t, source in condition.conditions.items():
+            if t != moving.wrt.first():
+                source.deactivate()
+
+
+def _lead_first_time(moving, form):
+    """Let the first element decide its left boundary, where multipliers nu are free as long as lam is zero.
+
+    A value of nu that is neither 0 nor 1 would tie the initial state to lam = 0.
+    """
+    first, free, hints = moving.grid.elements[0], _free_components(moving), homotopy_hints(moving.block)
+    for condition in moving.complementarities:
+        if first.left not in condition.sides or not condition.points(first):
+            continue
+        nu, lam = condition.sides[first.left]
+        continuous = any(lam is value for value in condition.values(first, 1))
+        if continuous and all(v.parent_component() in free for v in identify_variables(nu)):
+            leader = moving.pairs[(condition.name, first.n, *[1] * FORMS[form])]
+            hints.followers.append(Follower(condition.conditions[first.left], leader, condition.swapped))
+
+
+def _free_components(moving):
+    """Components of the multipliers of modes; not of the parts of mixed conditions, which have an equation at every time."""
+    parts = ComponentSet(v.parent_component() for split in moving.splits.values() for v in (split.p, split.n) if v is not None)
+    return ComponentSet(v.parent_component() for v in all_switched_systems(moving.block.model()).selectors) - parts
+
+
+def _among(v, selectors):
+    return v in selectors or v.parent_component() in selectors
+
+
+def _pairs(condition, element, form) -> Iterator[tuple]:
+    """The pairs of eq. (11) for one time complementarity and element, with their point indices."""
+    if not condition.points(element):
+        return
+    G, H = condition.values(element, 0), condition.values(element, 1)
+    if form == 'element':
+        yield (), (quicksum(G), quicksum(H))
+    elif form == 'point':
+        yield from (((r,), (G_r, quicksum(H))) for r, G_r in enumerate(G, start=1))
+    else:
+        yield from (((r, s), (G_r, H_s)) for r, G_r in enumerate(G, start=1) for s, H_s in enumerate(H, start=1))
+
+
+def _add_signs(moving):
+    """G >= 0 and H >= 0 at every point and after every jump, where the bounds of the variables do not imply it."""
+    block, bounds = moving.block, ExpressionBoundsVisitor()
+    block.nonnegative = moving.nonnegative = ConstraintList()
+    block.sign_after = moving.sign_after = Constraint(block.condition, block.element, [1, 2])
+    for condition in moving.complementarities:
+        for expr in (expr for pair in condition.sides.values() for expr in pair):
+            if not _never_negative(expr, bounds):
+                block.nonnegative.add(expr >= 0)
+        for n, pair in condition.starts.items():
+            for side, expr in enumerate(pair, start=1):
+                if not _never_negative(expr, bounds):
+                    block.sign_after.add((condition.name, n, side), expr >= 0)
+
+
+def _never_negative(expr, bounds):
+    """Whether the bounds of the variables imply expr >= 0 for all values of mutable Params."""
+    if any(True for _ in mutable_parameters(expr)) or any(map(_bound_may_change, identify_variables(expr))):
+        return False
+    low = expr.lb if expr.is_variable_type() else bounds.walk_expression(expr)[0]
+    return low is not None and low >= 0
+
+
+def _bound_may_change(v):
+    return any(hasattr(bound, 'is_expression_type') for bound in (v.lower, v.upper))
+
+
+def _equate_left_limits(moving):
+    """Gauss: nu at an element boundary, which is not a collocation point, equals nu at the last collocation point before it.
+
+    Without these equations it would be free, and an objective at the final time could exploit it.
+    """
+    moving.block.left_limit = moving.left_limit = ConstraintList()
+    selectors, equated = all_switched_systems(moving.block.model()).selectors, ComponentSet()
+    for condition in moving.complementarities:
+        if condition.continuous[0] or _repeats_other_side(moving, condition):
+            continue
+        for element in moving.grid.elements:
+            if element.right in condition.sides and condition.points(element):
+                right, last = (condition.sides[t][0] for t in (element.right, condition.points(element)[-1]))
+                _equate(moving.left_limit, right, last, selectors, equated)
+
+
+def _repeats_other_side(moving, condition):
+    t, (jumping, _) = next(iter(condition.sides.items()))
+    return repeats_other_side(moving, condition.conditions[t], jumping)
+
+
+def _equate(left_limit, right, last, selectors, equated):
+    """Equate the independent multipliers of two sides, each once; the sides themselves where they have none."""
+    variables = list(zip(identify_variables(right), identify_variables(last)))
+    chosen = [(v, w) for v, w in variables if _among(v, selectors)]
+    for v, w in chosen:
+        if v not in equated:
+            equated.add(v)
+            left_limit.add(v == w)
+    if not chosen and not any(v in equated or is_generated(v) for v, _ in variables):
+        left_limit.add(right == last)

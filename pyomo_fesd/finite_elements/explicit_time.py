@@ -1,0 +1,137 @@
+"""Warn of data that depend on time labels, which are not physical time once elements move: a clock state replaces them."""
+
+import logging
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from functools import partial
+from math import isfinite
+
+from pyomo.core import Block, Constraint, value
+from pyomo.core.expr.visitor import identify_variables
+from pyomo.mpec import Complementarity
+
+from pyomo_fesd.core import (
+    MovingGrid,
+    TimeIndex,
+    is_discretisation_equation,
+    kept_values,
+    prefix_tokens,
+    read_side,
+    strip_time,
+)
+from pyomo_fesd.finite_elements.quadrature import Integrand
+
+logger = logging.getLogger('pyomo_fesd')
+
+#: About how many points of a constraint over time are compared.
+COMPARED = 12
+#: Values of variables at which expressions are compared: the first one, and how the others follow.
+TRIALS = ((0.7, 0.11), (0.0, 0.0), (7.3, -0.19), (-3.1, 0.23))
+#: Relative difference of numbers that are equal.
+SAME = 1e-9
+
+
+def warn_explicit_time(moving: MovingGrid, expressions: Iterable[tuple]) -> None:
+    """Warn once for each of ``expressions_over_time`` whose numbers change with time.
+
+    With every variable at one value, all points of a constraint without explicit time give the same number.  Control stages
+    may have data of their own, so points are compared within a control stage.
+    """
+    stage = {t: e.stage for e in moving.grid.elements for t in e.own_labels}
+    for name in dict.fromkeys(name for name, by_time in expressions if _depends_on_time(by_time, stage)):
+        logger.warning(
+            "%s: its numbers depend on the time label (a Param over time, or t itself in a rule). Labels are not physical "
+            "time once elements move. Take time from a clock state, pyomo_fesd.clock(m, m.%s)[t], give a time series with "
+            "pyomo_fesd.signal, or name inputs that are constant on each control stage in piecewise_constant.",
+            strip_time(name),
+            moving.wrt.local_name,
+        )
+
+
+def _depends_on_time(by_time, stage):
+    """Whether points of one control stage differ."""
+    points = _spread([t for t in by_time if t in stage])
+    return any(differ([by_time[t] for t in points if stage[t] == s]) for s in {stage[t] for t in points})
+
+
+def expressions_over_time(
+    block: Block, moving: MovingGrid, integrands: list[Integrand], laws: Iterable[tuple]
+) -> list[tuple[str, dict[float, Callable]]]:
+    """Return ``(name, {label: function that gives an expression})`` of all components over time that a user's rule made.
+
+    Parameters
+    ----------
+    laws : iterable of (name, {time: tuple of expressions})
+        guards and resets of state jumps, conditions of modes with hysteresis
+    """
+    components = block.component_objects((Constraint, Complementarity), active=True, descend_into=Block)
+    datas = (d for c in components if not is_discretisation_equation(c) for d in c.values() if d.active)
+    by_name = TimeIndex(moving.wrt).families(datas)
+    found = [(name, {t: partial(_expression, d) for t, d in by_time.items()}) for name, by_time in by_name.items()]
+    points = _spread([t for e in moving.grid.elements for t in e.points])
+    found += [(i.name, {t: partial(i.at, t) for t in points}) for i in integrands]
+    return found + [(name, {t: partial(_weighted, parts) for t, parts in by_time.items()}) for name, by_time in laws]
+
+
+def _expression(data):
+    """One expression whose value depends on all numbers of a constraint or condition."""
+    if data.ctype is Complementarity:
+        sides = [read_side(a) for a in getattr(data, '_args', None) or ()]
+        return _weighted(part for s in sides for part in s)
+    return data.body - _weighted((data.lower, data.upper))
+
+
+def _weighted(parts):
+    return sum(k * part for k, part in enumerate((part for part in parts if part is not None), start=1))
+
+
+def _spread(points):
+    """At most about a dozen of many points, spread over all of them."""
+    return points[:: max(1, len(points) // COMPARED)]
+
+
+def differ(expressions: list[Callable]) -> bool:
+    """Whether the expressions that these functions return differ where all variables have the same values."""
+    bodies = [expression() for expression in expressions]
+    by_length = defaultdict(list)
+    for leaves in map(_leaves, bodies):
+        by_length[len(leaves)].append(leaves)
+    # a factor of 1 or a term of 0 leaves an expression that is built otherwise
+    change = any(_unequal(a, b) for first, *others in by_length.values() for other in others for a, b in zip(first, other))
+    if not change and len(by_length) == 1:
+        return False
+    compared = [numbers for numbers in (_at_trial(bodies, trial) for trial in TRIALS) if None not in numbers]
+    return any(_unequal(numbers[0], number) for numbers in compared for number in numbers) if compared else change
+
+
+def _unequal(a, b):
+    return abs(a - b) > SAME * max(abs(a), abs(b))
+
+
+def _leaves(body):
+    """The finite numbers in an expression, in its order."""
+    return [number for number in prefix_tokens([body], _enter) if number.__class__ in (int, float) and isfinite(number)]
+
+
+def _enter(node):
+    """The value of a Param; the arguments of an operation."""
+    if node.is_expression_type():
+        return None, list(node.args)
+    return None if node.is_variable_type() else value(node, exception=False), ()
+
+
+def _at_trial(bodies, trial):
+    return [_at_fixed_values(body, *trial) for body in bodies]
+
+
+def _at_fixed_values(body, first, step):
+    """Value where the k-th variable of the expression is first + step k; None where it is undefined."""
+    variables = list(identify_variables(body, include_fixed=True)) if hasattr(body, 'is_expression_type') else []
+    with kept_values(variables):
+        for k, v in enumerate(variables):
+            v.set_value(first + step * k, skip_validation=True)
+        try:
+            number = value(body, exception=False)
+        except (ArithmeticError, ValueError):
+            return None
+        return number if isinstance(number, (int, float)) and isfinite(number) else None

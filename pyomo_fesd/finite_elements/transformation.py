@@ -1,0 +1,276 @@
+"""``fesd.finite_elements``: collocation on elements whose boundaries find the switches."""
+
+from dataclasses import dataclass
+
+from pyomo.common.collections import ComponentSet
+from pyomo.common.config import document_class_CONFIG
+from pyomo.common.gc_manager import PauseGC
+from pyomo.common.modeling import unique_component_name
+from pyomo.core import Block, Transformation, TransformationFactory, Var
+from pyomo.gdp import Disjunct, Disjunction
+from pyomo.mpec.complementarity import ComplementarityData
+
+from pyomo_fesd.core import (
+    GENERATED,
+    TRANSFORMATION,
+    FesdError,
+    MovingGrid,
+    TimeIndex,
+    derivatives,
+    discretised,
+    find_continuous_set,
+    homotopy_hints,
+    is_generated,
+    label_decimals,
+    moving_grids,
+    read_grid,
+    restored_on_error,
+    share_elements,
+    signals,
+    write_at_further_times,
+)
+from pyomo_fesd.finite_elements.coincidences import add_coincidences
+from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
+from pyomo_fesd.finite_elements.controls import check_controls, fix_given, hold_controls
+from pyomo_fesd.finite_elements.cross_complementarity import add_cross_complementarity
+from pyomo_fesd.finite_elements.equilibration import add_equilibration
+from pyomo_fesd.finite_elements.expansion import discretise
+from pyomo_fesd.finite_elements.explicit_time import expressions_over_time, warn_explicit_time
+from pyomo_fesd.finite_elements.free_time import check_free_time, factors
+from pyomo_fesd.finite_elements.given_inputs import complete_params
+from pyomo_fesd.finite_elements.hysteresis import add_hysteresis, read_hysteresis
+from pyomo_fesd.finite_elements.lengths import add_lengths, check_orders, multiply_derivatives
+from pyomo_fesd.finite_elements.mixed_complementarity import split_mixed
+from pyomo_fesd.finite_elements.mode_limits import with_mode_limits
+from pyomo_fesd.finite_elements.neighbour_branches import add_neighbour_branches
+from pyomo_fesd.finite_elements.options import RENAMED, declare_options
+from pyomo_fesd.finite_elements.quadrature import integrands, rebuild
+from pyomo_fesd.finite_elements.right_limits import RightLimits
+from pyomo_fesd.finite_elements.sliding_exit import add_sliding_exits
+from pyomo_fesd.finite_elements.spatial_sets import refuse_waiting_space
+from pyomo_fesd.finite_elements.state_jumps import add_state_jumps, check_guards, read_jumps
+from pyomo_fesd.finite_elements.time_complementarities import (
+    conditions_over_time,
+    read_time_complementarities,
+    refuse_lists_of_times,
+    warn_gauss_on_curved_surfaces,
+    warn_unknown,
+)
+from pyomo_fesd.finite_elements.untaken_kinks import warn_untaken_kinks
+
+
+@dataclass
+class _Switching:
+    """All that switches over time: pairs and mixed conditions (name -> {time: data}), modes with hysteresis, state jumps."""
+
+    pairs: dict
+    mixed: dict
+    modes: list
+    jumps: list
+
+    def __bool__(self):
+        return bool(self.pairs or self.mixed or self.modes or self.jumps)
+
+    def by_time(self):
+        """Everything that is a condition, each as {time: condition}."""
+        yield from (*self.pairs.values(), *self.mixed.values())
+        yield from (mode.conditions for mode in self.modes)
+        yield from (law.guards for law in self.jumps)
+
+    def laws(self):
+        """What holds at element boundaries: ``(name, {time: expressions})``."""
+        yield from ((mode.system, mode.conditions) for mode in self.modes)
+        for law in self.jumps:
+            yield law.name, {t: (law.guards[t], *(after for _, after in resets)) for t, resets in law.resets.items()}
+
+
+@TransformationFactory.register('fesd.finite_elements', doc="Finite elements with switch detection, on top of pyomo.dae")
+@document_class_CONFIG(methods=['apply_to', 'create_using'])
+class FiniteElements(Transformation):
+    """Discretise by collocation with variable element lengths h_n that find the switches (theory, eq. 9-13).
+
+    pyomo.dae discretises; then every discretisation equation gets the multiplier r_n = h_n/hbar_n, the complementarities over
+    time are aggregated over each element (eq. 11), and step equilibration ties the lengths where nothing switches (eq. 13).
+    Where the complementarities come from does not matter: ``fesd.dcs``, or the user's own ``Complementarity`` over time; one with
+    two bounds on one side becomes two pairs.
+
+    The points that the ContinuousSet has before are boundaries of control stages: they keep their physical time, and each
+    control stage gets the same number of elements, unless ``nfe`` lists others.  The final time, or the length of each control
+    stage, may be a variable.  On a model that is discretised already, the present grid is made movable.
+
+    Raises
+    ------
+    FesdError
+        naming the component, the cause and the fix; the model is then unchanged.
+
+    Source: paper, eq. (8)-(10); Baumrucker and Biegler (2009); Nurkanovic et al. (2024).
+    """
+
+    CONFIG = declare_options()
+
+    def _apply_to(self, instance, **kwds):
+        RENAMED.refuse(kwds)
+        config = self.CONFIG(kwds.pop('options', {}))
+        config.set_value(kwds)
+        wrt = find_continuous_set(instance, config.wrt, 'fesd.finite_elements')
+        instance = _common_block(instance, wrt)
+        _check_keywords(instance, wrt, config)
+        with TRANSFORMATION, restored_on_error(instance, wrt), PauseGC():
+            moving = _add_grid(instance, wrt, config)
+            integrals = _rebuild_integrals(instance, moving)
+            switching = _read_switching(instance, wrt, config)
+            _warn(expressions_over_time(instance, moving, integrals, switching.laws()), moving)
+            continuity = _read_continuity(instance, moving, switching, config)
+            complementarities = _read_complementarities(moving, switching, continuity)
+            hold_controls(moving, config.piecewise_constant)
+            multiply_derivatives(moving)
+            _add_switching(moving, switching, complementarities, continuity, config)
+            _relate_sizes(moving)
+
+    def get_src_complementarity(self, pair):
+        """Return the conditions over time that an aggregated pair sums up."""
+        return next(moving.sources[pair] for moving in moving_grids(pair).values() if pair in moving.sources)
+
+    def get_element_lengths(self, wrt):
+        """Return the length multipliers r_n = h_n/hbar_n (an IndexedVar over 1..N) of a moving grid, both lengths in labels."""
+        return moving_grids(wrt)[wrt].r
+
+
+def _common_block(block, wrt):
+    """``block``, or the block of ``wrt`` if that lies above it (a flowsheet in a flowsheet): one grid for all over one time."""
+    parent = wrt.parent_block()
+    while parent is not None and parent is not block:
+        parent = parent.parent_block()
+    return wrt.parent_block() if parent is None else block
+
+
+def _check_keywords(instance, wrt, config):
+    """Refuse models and options before anything is changed."""
+    if wrt in moving_grids(instance):
+        raise FesdError(wrt, "its elements are movable already", "apply fesd.finite_elements once for each ContinuousSet")
+    for name in ('nfe', 'ncp'):
+        if config.get(name).value() is None:
+            raise FesdError(wrt, f"fesd.finite_elements: {name}=None", f"give a positive number, or leave {name} out")
+    check_controls(config.piecewise_constant, wrt)
+    check_continuous(config.continuous, config.piecewise_constant, wrt)
+    check_free_time(config.final_time, config.stage_lengths, wrt, signals(wrt))
+    refuse_lists_of_times(instance, TimeIndex(wrt))
+    refuse_waiting_space(instance.model(), wrt)
+    if discretised(wrt):
+        return
+    if config.stages is not None:
+        raise FesdError(
+            wrt,
+            "stages= was given for a set that is not discretised yet",
+            "put these boundaries into the ContinuousSet",
+        )
+    label_decimals(wrt, share_elements(wrt, config.nfe), config.ncp)
+
+
+def _add_grid(instance, wrt, config):
+    """Discretise, continue ``fesd.dcs`` at the new times, and return the record of the grid with its lengths."""
+    stages = _discretise(instance, wrt, config)
+    grid, model = read_grid(wrt, stages), instance.model()
+    fix_given(config.piecewise_constant, grid, wrt)
+    write_at_further_times(model, wrt)
+    check_orders(model, wrt)
+    block = Block()
+    instance.add_component(unique_component_name(instance, GENERATED + 'elements_' + wrt.local_name), block)
+    moving_grids(instance)[wrt] = moving = MovingGrid(wrt, block, grid)
+    add_lengths(moving, config.length_bounds, factors(config.final_time, config.stage_lengths, stages))
+    return moving
+
+
+def _discretise(instance, wrt, config):
+    """Lay the grid if there is none; return the control-stage boundaries."""
+    if discretised(wrt):
+        return sorted({wrt.first(), wrt.last(), *(config.stages or ())})
+    stages = list(wrt)
+    given = [*config.piecewise_constant, *signals(wrt)]
+    discretise(instance, wrt, share_elements(wrt, config.nfe), config.ncp, config.scheme, given)
+    complete_params(instance, wrt, given)
+    return stages
+
+
+def _rebuild_integrals(instance, moving):
+    """Before conditions are read: piecewise functions inside an integrand have conditions of their own."""
+    found = list(integrands(instance.model(), moving.wrt))
+    for integrand in found:
+        rebuild(moving, integrand)
+    return found
+
+
+def _read_switching(instance, wrt, config):
+    pairs, mixed = conditions_over_time(instance, TimeIndex(wrt))
+    model = instance.model()
+    switching = _Switching(pairs, mixed, read_hysteresis(model, wrt), read_jumps(model, wrt))
+    check_guards(switching.jumps, _held(config, wrt))
+    if not switching:
+        _refuse_disjunctions(instance, TimeIndex(wrt))
+    return switching
+
+
+def _warn(expressions, moving):
+    """Warn of what elements that move do not see."""
+    warn_explicit_time(moving, expressions)
+    warn_untaken_kinks(expressions)
+
+
+def _held(config, wrt):
+    """Inputs that are constant between two boundaries that keep their time."""
+    states = ComponentSet(d.get_state_var() for d in derivatives(wrt.model(), wrt))
+    return [*config.piecewise_constant, *(v for v in signals(wrt) if v not in states)]
+
+
+def _refuse_disjunctions(instance, times):
+    """A Disjunction that nobody transformed would impose nothing; beside other conditions it may be there on purpose."""
+    for disjunction in instance.component_data_objects(Disjunction, active=True, descend_into=Block):
+        if times.time(disjunction) is not None:
+            raise FesdError(
+                disjunction, "an active Disjunction over time", "apply fesd.dcs first: its complementarity finds the switches"
+            )
+
+
+def _read_continuity(instance, moving, switching, config):
+    """Continuity at the inner labels of the conditions; by the equations there if they can matter."""
+    conditions, grid = list(switching.by_time()), moving.grid
+    labels = {inner_label(by_time, moving.wrt) for by_time in conditions}
+    found = (condition for by_time in conditions for condition in by_time.values())
+    written = not all(isinstance(c, ComplementarityData) and is_generated(c) for c in found)
+    trace = written or (bool(conditions) and (len(grid.stages) > 1 or not grid.right_is_collocated))
+    times = TimeIndex(moving.wrt)
+    return read_continuity(instance.model(), times, labels, _held(config, moving.wrt), config.continuous, trace)
+
+
+def _read_complementarities(moving, switching, continuity):
+    pairs = switching.pairs | split_mixed(moving, switching.mixed, continuity)
+    found = read_time_complementarities(moving, pairs, continuity)
+    if not moving.grid.right_is_collocated:
+        warn_gauss_on_curved_surfaces(moving, found, continuity)
+    return found
+
+
+def _relate_sizes(moving):
+    """A quantity over time has one size, by which the solver scales it."""
+    variables = moving.block.model().component_data_objects(Var, descend_into=(Block, Disjunct))
+    families = TimeIndex(moving.wrt).families(variables)
+    homotopy_hints(moving.block).alike += [tuple(by_time.values()) for by_time in families.values()]
+
+
+def _add_switching(moving, switching, complementarities, continuity, config):
+    """Write the pairs of all that switches, and the conditions on the lengths."""
+    add_state_jumps(moving, switching.jumps)
+    limits = RightLimits(moving, continuity, [*_held(config, moving.wrt), *config.continuous])
+    complementarities = list(map(limits.with_starts, complementarities))
+    add_hysteresis(moving, switching.modes, limits)
+    complementarities = with_mode_limits(moving, complementarities, continuity, config.piecewise_constant)
+    warn_unknown(moving, complementarities)
+    add_cross_complementarity(moving, complementarities, config.cross_complementarity)
+    if not switching:
+        moving.r.fix(1)
+        return
+    add_equilibration(moving, config.equilibration, config.rho)
+    if config.equilibration == 'two_stage':
+        add_sliding_exits(moving)
+    add_neighbour_branches(moving)
+    add_coincidences(moving)

@@ -1,0 +1,311 @@
+"""Branches: solved, certified, and left for better ones as long as the LPEC finds a direction (theory, section 4).
+
+The best point so far is ``Run.point``: an exactly complementary solution of its branch NLP with the certificate of the LPEC.
+"""
+
+from collections import Counter
+
+import numpy as np
+
+from pyomo_fesd.mpcc.algorithm.search import FEW, Verdict, exhaust, leaves
+from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Stop
+from pyomo_fesd.mpcc.subproblems import G_ZERO, Stationarity
+
+#: A branch NLP's objective must fall by this, relative, to count as descent.
+PROGRESS = 1e-8
+#: Attempts at a branch NLP before it counts as infeasible.
+TRIES = 2
+#: Iterations of the first and of the second attempt; and how many more if they only lead to a feasible point (None: no limit).
+FIRST, SECOND = 30, 100
+MORE = {FIRST: SECOND, SECOND: None}
+#: The trust region of a descent step shrinks by this factor, so many times.
+SHRINK, SHRINKS = 0.1, 3
+#: Ipopt leaves sides without a multiplier at the root of its tolerance.  Those below this count as zero as well, if this descends
+#: clearly: gradients are inexact too.
+NEARLY, CLEAR = 1e-4, 1e-4
+#: With more bi-active pairs than this an LPEC takes long and tells little about the branch.
+SUGGESTED = 50
+#: Trust region of the LPEC that searches for any feasible branch.
+SEARCH_RADIUS = 1e3
+#: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
+#: one it came from an unbounded relaxation.
+UNBOUNDED = 1e15
+#: A variable nearer to its lower bound than this is at it.
+AT_BOUND = 1e-6
+#: A point is more even than another if its deviations are smaller by this part.
+EVENER = 1e-3
+#: A more even solution may cost this much more, relative: the error of uneven elements, not another minimum.
+AS_GOOD = 1e-4
+
+
+class Branches:
+    """The branches of one run.
+
+    Parameters
+    ----------
+    subsolves : Subsolves
+    gap : GapTest
+        of the homotopy: a point far above the objective that it promises is not worth a descent
+    global_lpec : bool
+        whether a full LPEC searches beyond the bi-active pairs for a better branch (option ``lpec='full'``)
+    """
+
+    def __init__(self, subsolves, gap, global_lpec):
+        self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
+        self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
+        self._attempts, self._solved, self._exhausted = Counter(), {}, {}
+
+    # called by the algorithm
+
+    def explore(self, relaxed, sets, final):
+        """Solve the branch that active sets name, or if it has no solution, the one that an LPEC suggests; descend from it.
+
+        Parameters
+        ----------
+        relaxed : NlpResult
+            a relaxation's result
+        sets : ActiveSets
+            at this point
+        final : bool
+            whether the homotopy ends here: no iteration limit, and every descent is followed
+
+        Returns
+        -------
+        float or None
+            the objective of the branch that the sets name, if it has a certified solution
+        """
+        point = self._point(relaxed.w, sets.zero, relaxed, final)
+        if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
+            zero = self._subsolves.suggestion(relaxed.w, sets, self._tolerances.radius).zero
+            point = self._point(relaxed.w, zero, relaxed, final)
+        # with the global LPEC search for better branches now: this point is not revisited
+        self.improve_from(point, final or self._global_lpec)
+        return self._solved.get(sets.zero.tobytes())
+
+    def explore_from(self, w, final):
+        """Solve the branch that the values ``w`` name."""
+        self.improve_from(self._point(w, self._subsolves.sets(w, self._tolerances.biactive).zero, None, final), final)
+
+    def try_neighbours(self):
+        """Solve the neighbouring branches of the incumbent, and those of each better point found."""
+        neighbours = list(self._c.neighbours)
+        while neighbours:
+            point, neighbour = self.run.point, neighbours.pop(0)
+            zero = self._zero_sides(point, neighbour)
+            if zero is not None and not self.tried(zero):
+                start = point.w.copy()
+                start[neighbour.starts] = neighbour.at
+                self._widen_from(self.improve_from(self._point(start, zero, None, True), False))
+                if self.run.point.f < point.f - PROGRESS * max(1.0, abs(point.f)):
+                    neighbours = list(self._c.neighbours)
+
+    def _widen_from(self, end):
+        """Go on without guide bounds from a point below the incumbent that only these keep from descending."""
+        if end is None or end.certificate.grade is not Stationarity.LIMITED:
+            return
+        if _is_below(end, self.run.point.f - PROGRESS * max(1.0, abs(self.run.point.f))) and self._c.widen():
+            zero = self._subsolves.sets(end.w, self._tolerances.biactive).zero
+            self.improve_from(self.certified(end.w, zero, max_iter=SECOND), True)
+
+    def even_out(self):
+        """From a certified incumbent with variables above their guide bounds, go to neighbouring branches where they are lower.
+
+        The values of the pairs stay as they are in their order; the method's own variables, free in a solution, are shared evenly.
+        """
+        point, tried = self.run.point, set()
+        if point is None or not point.certificate.certified or not self._is_uneven(point.w):
+            return
+        while point is not None:
+            self.run.point = point
+            point = self._more_even(point, tried)
+
+    def _is_uneven(self, w):
+        c = self._c
+        return bool((w[c.guided] > c.guide_ubx[c.guided] + AT_BOUND).any())
+
+    def _unevenness(self, w):
+        c, guided = self._c, self._c.guided
+        return float(((w[guided] - (c.guide_lbx[guided] + c.guide_ubx[guided]) / 2) ** 2).sum())
+
+    def _more_even(self, point, tried):
+        """A certified solution of a neighbouring branch that is more even; small variables are the first to change sides."""
+        candidates = [n for n in self._c.neighbours if n.short.size]
+        most = point.f + AS_GOOD * max(1.0, abs(point.f))
+        for neighbour in sorted(candidates, key=lambda n: point.w[n.short].max()):
+            zero = self._zero_sides(point, neighbour, always=True)
+            if zero is None or zero.tobytes() in tried:
+                continue
+            tried.add(zero.tobytes())
+            found = self.certified(point.w, zero, max_iter=SECOND)
+            if found is not None and found.certificate.certified and found.f <= most and self._is_more_even(found.w, point.w):
+                return found
+        return None
+
+    def _is_more_even(self, w, before):
+        return self._unevenness(w) < self._unevenness(before) * (1 - EVENER)
+
+    def _zero_sides(self, point, neighbour, always=False):
+        """The zero sides of a neighbouring branch of ``point``; None if it need not be tried."""
+        at_bound = np.any(point.w[neighbour.short] <= self._c.lbx[neighbour.short] + AT_BOUND)
+        if neighbour.short.size and not at_bound and not always:
+            return None
+        sets = self._subsolves.sets(point.w, self._tolerances.biactive)
+        zero = sets.zero.copy()
+        zero[neighbour.ended] = G_ZERO
+        zero[neighbour.targets] = sets.zero[neighbour.sources]
+        # the point lies on both sides of a bi-active pair already
+        return zero if np.any((zero != sets.zero) & ~sets.gamma) else None
+
+    def search(self, *starts):
+        """Search for any feasible branch: by the LPEC with every pair as a binary, then depth first over the pairs."""
+        self.forget()
+        # within the guide bounds, as degenerate branches beyond them would hide the contradiction
+        self._c.narrow()
+        for w in starts:
+            step = self._subsolves.suggestion(w, self._subsolves.sets(w, np.inf), SEARCH_RADIUS)
+            if step.solved and self._found(w + step.d, step.zero):
+                return
+        self._subsolves.note("search over the pairs", starts[-1])
+        for w, zero in leaves(self._c, self._subsolves.branch, starts[-1], self._tolerances.feasibility):
+            if self._found(w, zero):
+                return
+
+    def exhaust(self, w):
+        """The ``Verdict`` of an exhaustive search from ``w``, of a problem with few pairs and without guide bounds."""
+        if self._c.guided.any():
+            return Verdict.OPEN
+        key = w.tobytes()
+        if key not in self._exhausted:
+            if self._c.G.numel() <= FEW:
+                self._subsolves.note("search over the pairs", w)
+            self._exhausted[key] = exhaust(self._c, self._subsolves.node, w)
+        return self._exhausted[key]
+
+    def tried(self, zero):
+        """Whether a branch has had its attempts."""
+        return self._attempts[zero.tobytes()] >= TRIES
+
+    def forget(self):
+        """Reset the attempts: a branch that failed may succeed from another path."""
+        self._attempts.clear()
+
+    # how a point is found
+
+    def _found(self, w, zero):
+        self.improve_from(self._point(w, zero, None, True), True)
+        return self.run.point is not None
+
+    def improve_from(self, point, final):
+        """Keep ``point`` and the points that descend from it, unless the homotopy promises something much better.
+
+        Returns the last of them.
+        """
+        end = None
+        while point is not None:
+            self._keep(point)
+            end, point = point, self._descend(point, final or self._gap.closed(point.f))
+        return end
+
+    def _keep(self, point):
+        """Keep the better of the incumbent and ``point``: certified before uncertified, then the lower objective."""
+        best = self.run.point
+        if best is None or (not point.certificate.certified, point.f) < (not best.certificate.certified, best.f):
+            self.run.point = point
+
+    def _descend(self, point, worth):
+        """A better point, or None; a point that is not ``worth`` a descent only gets the check of its certificate."""
+        size = max(1.0, abs(point.f))
+        enough = point.f - PROGRESS * size
+        if point.certificate.grade is Stationarity.DESCENT:
+            return self._step_down(point, enough) if worth else None
+        if point.certificate.grade is not Stationarity.B:
+            return None
+        better = self._beyond(point, enough, NEARLY, CLEAR)
+        return self._beyond(point, enough, np.inf, 0.0) if better is None and worth and self._global_lpec else better
+
+    def _step_down(self, point, enough):
+        """In the branch of the certificate's direction: from its end, or within ever smaller trust regions."""
+        step, w = point.certificate.lpec, point.w
+        better = self._point(w + step.d, step.zero, None, False)
+        radius = self._tolerances.radius
+        sets = self._subsolves.sets(w, self._tolerances.biactive)
+        for _ in range(SHRINKS):
+            if _is_below(better, enough) or _settles(better, point):
+                return better
+            radius *= SHRINK
+            step = self._subsolves.lpec(w, sets, radius, point.equal)
+            if not step.solved or step.descent == 0.0:
+                return None
+            reach = radius * np.maximum(1.0, np.abs(w))
+            better = self.certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=FIRST)
+        return better if _is_below(better, enough) or _settles(better, point) else None
+
+    def _beyond(self, point, enough, tolerance, clear):
+        """A better point in the branch that the LPEC names if all sides below ``tolerance`` count as zero."""
+        sets = self._subsolves.sets(point.w, tolerance)
+        if np.count_nonzero(sets.gamma) <= point.certificate.biactive:
+            return None
+        step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal)
+        if not step.solved or step.descent <= clear:
+            return None
+        better = self._point(point.w + step.d, step.zero, None, False)
+        return better if _is_below(better, enough) else None
+
+    def _point(self, w, zero, duals, final):
+        """The solution of branch ``zero``, certified; None if it has none.
+
+        A branch that was solved is not solved again; one that failed is tried once more, without multipliers.
+        """
+        if self.tried(zero):
+            return None
+        key = zero.tobytes()
+        self._attempts[key] += 1
+        last = self._attempts[key] == TRIES
+        duals = None if last else duals
+        point = self.certified(w, zero, duals=duals, max_iter=SECOND if final or last else FIRST)
+        if point is None and final and duals is not None:
+            point = self.certified(w, zero, duals=None)
+        if point is not None and point.certificate.grade is not Stationarity.DESCENT:
+            self._attempts[key], self._solved[key] = TRIES, point.f
+        return point
+
+    def certified(self, w, zero, duals=None, **more):
+        """The certified solution of a branch; None if it has none."""
+        solved, equal = self._solve(w, zero, duals, **more)
+        if solved is not None and not solved.solved and more.get('max_iter') in MORE:
+            # feasible, so the branch has a solution, but not at its minimum yet
+            solved, equal = self._solve(solved.w, zero, solved, **more | {'max_iter': MORE[more['max_iter']]})
+        if solved is None:
+            return None
+        f = self._c.evaluate(solved.w).f
+        if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
+            if f < self._c.evaluate(self._c.x0).f:
+                raise Stop(Outcome.UNBOUNDED)
+            return None
+        certificate = self._subsolves.certify(solved, equal)
+        return Point(solved, f, certificate, equal) if certificate.feasible else None
+
+    def _solve(self, w, zero, duals, **more):
+        """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force."""
+        return self.decided(self._subsolves.branch(w, zero, None, 1.0, duals=duals, **more), zero, **more)
+
+    def decided(self, first, zero, apart=False, **more):
+        """The second NLP, after the solution ``first`` of a branch, and the decisions in force; none of ``apart``."""
+        c = self._c
+        if first is None or not c.eta.numel():
+            return first, None
+        equal = (c.evaluate(first.w).eta > self._tolerances.eta) & ~np.asarray(apart)
+        second = self._subsolves.branch(first.w, zero, equal, 0.0, duals=first, **more)
+        if second is None and np.any(equal & c.tentative):
+            equal = equal & ~c.tentative
+            second = self._subsolves.branch(first.w, zero, equal, 0.0, duals=first, **more)
+        return second, equal
+
+
+def _settles(better, point):
+    """Whether another point is certified and as good, where the descent of this one is too small to count as progress."""
+    return better is not None and better.certificate.certified and better.f <= point.f
+
+
+def _is_below(point, enough):
+    return point is not None and point.f <= enough

@@ -1,0 +1,187 @@
+"""Coinciding changes: every order of them is tried before a point counts as certified.
+
+In the incumbent the branches of all orders meet, but none of them is beside it for the LPEC: the place between two changes has no
+extent there.  For each order the incumbent is solved once more with such a place, of extent zero.  If the linearised problem of
+that branch descends, the place grows and leads to a better point; if it does not, or if there is no such branch, the order is
+settled.  A point with an order that is neither is not certified.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from pyomo_fesd.mpcc.algorithm.branches import AT_BOUND, PROGRESS, SECOND
+from pyomo_fesd.mpcc.algorithm.state import Point
+from pyomo_fesd.mpcc.algorithm.subsolves import INFEASIBLE
+from pyomo_fesd.mpcc.nlp import NlpResult
+from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets, Stationarity
+
+#: Iterations enough to show that there is no branch of an order.
+PATIENCE = 300
+#: Outcomes of an order that leads to no better point.
+SETTLED, OPEN = 'settled', 'open'
+
+
+class Coincidences:
+    """The coincidences of one run.
+
+    Parameters
+    ----------
+    subsolves : Subsolves
+    branches : Branches
+    """
+
+    def __init__(self, subsolves, branches):
+        self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
+        self._subsolves, self._branches = subsolves, branches
+
+    def settle(self):
+        """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
+        while self.run.point is not None and self.run.point.certificate.certified and self._c.has_objective:
+            before = self.run.point
+            # until all orders are settled any certified point is better
+            self.run.point = replace(before, certificate=replace(before.certificate, grade=Stationarity.OPEN))
+            found = self._outcome(before)
+            if found is SETTLED:
+                self.run.point = before
+            elif found is not OPEN:
+                self._branches.improve_from(found, True)
+            if found in (SETTLED, OPEN):
+                return
+
+    def checked(self, w, certificate):
+        """The certificate of a point that the LPEC has certified, after all orders were tried."""
+        if not self._c.has_objective:
+            return certificate
+        nlp = NlpResult(w, self._c.evaluate(w).f, 'given', 0, np.zeros(0), np.zeros(0))
+        found = self._outcome(Point(nlp, nlp.f, certificate))
+        if found is SETTLED:
+            return certificate
+        return replace(certificate, grade=Stationarity.OPEN if found is OPEN else Stationarity.DESCENT)
+
+    def _outcome(self, point):
+        """A better point; or whether all orders are settled."""
+        tried, outcome = set(), SETTLED
+        if self._is_flat(point):
+            return SETTLED
+        sets = self._subsolves.sets(point.w, self._tolerances.biactive)
+        for ways in self._orders(point.w, sets):
+            key = tuple((variable, zero.tobytes()) for variable, zero in ways)
+            if key in tried:
+                continue
+            tried.add(key)
+            found = self._first(partial(self._try, point), ways)
+            if found is OPEN:
+                outcome = OPEN
+            elif found is not SETTLED:
+                return found
+        return outcome
+
+    def _is_flat(self, point):
+        """Whether no direction descends, whatever the constraints."""
+        return not self._c.gradients(point.w)[0].any()
+
+    @staticmethod
+    def _first(attempt, ways):
+        """The first outcome of equivalent ways that is not open."""
+        return next((found for found in (attempt(*way) for way in ways) if found is not OPEN), OPEN)
+
+    def _orders(self, w, sets) -> Iterator[list]:
+        """For each order the equivalent ways, each a variable that vanishes and the zero sides of the branch."""
+        for coincidence, at in self._situations(w, sets):
+            present = [change for change in coincidence.changes if _differs(change, at)]
+            for some in _subsets(present, coincidence.fixed):
+                rest = [change for change in present if change not in some]
+                later = (coincidence.later, _moved(at.zero, [c.later for c in some]))
+                if coincidence.fixed:
+                    earlier = (coincidence.earlier, _moved(at.zero, [c.earlier for c in some]))
+                    yield _possible(later)
+                    yield _possible(earlier)
+                else:
+                    yield _possible(later, (coincidence.earlier, _moved(at.zero, [c.earlier for c in rest])))
+
+    def _situations(self, w, sets) -> Iterator[tuple]:
+        """Each coincidence with the active sets; also those as if the place beside it, at its lower bound, were none."""
+        by_later, by_earlier = ({getattr(c, side): c for c in self._c.coincidences} for side in ('later', 'earlier'))
+        for coincidence in self._c.coincidences:
+            yield coincidence, sets
+            beside = ((coincidence.later, by_earlier, 'earlier'), (coincidence.earlier, by_later, 'later'))
+            for variable, others, direction in beside:
+                if variable in others and variable is not None and w[variable] <= self._c.lbx[variable] + AT_BOUND:
+                    zero = _moved(sets.zero, [getattr(change, direction) for change in others[variable].changes])
+                    yield coincidence, ActiveSets(zero, np.zeros(len(zero), dtype=bool))
+
+    def _try(self, point, variable, zero):
+        """A better point in the branch ``zero``, in which ``variable`` may grow from 0; or the outcome."""
+        enough = self._tolerances.descent
+        with self._c.vanishing(variable):
+            start, beside = self._beside(point, variable, zero)
+            if start in (SETTLED, OPEN):
+                return start
+            equal, sets = beside, ActiveSets(zero, np.zeros(len(zero), dtype=bool))
+            step = self._subsolves.lpec(start.w, sets, self._tolerances.radius, equal, multipliers=-start.lam_g, enough=enough)
+        if not step.solved:
+            return OPEN
+        return SETTLED if step.descent <= enough else self._grown(point, start.w, step.d, zero)
+
+    def _beside(self, point, variable, zero):
+        """The incumbent in the branch ``zero`` with ``variable`` = 0, and the decisions in force; or the outcome."""
+        start, most = point.w.copy(), np.full(len(point.w), np.inf)
+        start[variable] = most[variable] = 0.0
+        more = {'box': (-most, most), 'max_iter': PATIENCE}
+        more['box'][0][variable] = 0.0
+        first = self._subsolves.attempt(start, zero, None, 1.0, **more)
+        if first is None or first.status in INFEASIBLE:
+            return SETTLED, None
+        apart = self._decides(point.w, variable)
+        solved, equal = self._branches.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
+        if first.solved and (solved is None or not solved.solved):
+            # without decisions there is more room: an order that does not descend then does not descend with them
+            solved, equal = self._subsolves.attempt(first.w, zero, None, 0.0, **more), np.zeros_like(apart)
+        return (solved, equal) if solved is not None and solved.solved else (OPEN, None)
+
+    def _decides(self, w, variable):
+        """The decisions that involve a variable: beside a place of extent zero nothing is decided, as changes lie on both sides."""
+        return self._c.gradients(w)[-1][:, [variable]].toarray().ravel() != 0.0
+
+    def _grown(self, point, w, d, zero):
+        """A point in the branch that is better than the incumbent; or OPEN."""
+        enough = point.f - PROGRESS * max(1.0, abs(point.f))
+        for start in (w + d, w):
+            found = self._branches.certified(start, zero, max_iter=SECOND)
+            if found is not None and found.f <= enough:
+                return found
+        return OPEN
+
+
+def _differs(change, sets):
+    """Whether a change is there; a bi-active or open pair lies on both sides of it already."""
+    undecided = sets.gamma | sets.open
+    clear = ~undecided[change.pairs] & ~undecided[change.partners]
+    return bool(np.any((sets.zero[change.pairs] != sets.zero[change.partners]) & clear))
+
+
+def _subsets(changes, fixed):
+    """The changes that come apart from the rest: each one alone, all but one, and all if the place itself matters."""
+    single = [[change] for change in changes]
+    if len(changes) > 2:
+        single += [[change for change in changes if change is not left_out] for left_out in changes]
+    if fixed:
+        return single + ([changes] if len(changes) > 1 else [])
+    return single if len(changes) > 1 else []
+
+
+def _moved(zero, moves):
+    """The zero sides after some changes have moved."""
+    found = zero.copy()
+    for move in moves:
+        found[move.ended] = G_ZERO
+        found[move.targets] = zero[move.sources]
+    return found
+
+
+def _possible(*ways):
+    """Without those for which there is no place."""
+    return [(variable, zero) for variable, zero in ways if variable is not None]

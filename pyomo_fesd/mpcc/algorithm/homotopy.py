@@ -1,0 +1,195 @@
+"""The path of relaxations Reg(eps), from which branches are explored (theory, section 4).
+
+As soon as the active sets of a relaxation look settled, the branch NLP that they name is solved.  The path goes on while its
+objective promises less than the incumbent's (gap test), and eps may rise again when a relaxation fails.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyomo_fesd.mpcc.algorithm.recovery import RECOVERIES
+from pyomo_fesd.mpcc.algorithm.search import Verdict
+from pyomo_fesd.mpcc.nlp import NlpResult
+from pyomo_fesd.mpcc.subproblems import ActiveSets, Stationarity
+
+#: For each path the form of its first relaxation and that of the others, without an objective and with one.  The elastic form is by
+#: far the quickest; Scholtes' at the first eps puts every pair in the middle, whatever the size of the objective.  The next path
+#: is for problems that the one before does not settle.
+AUTO = {
+    False: (('elastic', 'elastic'), ('scholtes', 'scholtes')),
+    True: (('elastic', 'elastic'), ('scholtes', 'elastic'), ('scholtes', 'scholtes')),
+}
+#: From this eps on multipliers are kept as a start; before, Ipopt's own centring finds better minima (a car: 13.3, not 16).
+WITH_MULTIPLIERS = 1e-2
+#: From this eps on a relaxation is worth a branch NLP, which is much cheaper than the next relaxation, unless more than this part
+#: of the pairs is undecided.
+LATE, UNDECIDED = 1e-3, 0.5
+#: With products below this and the same active sides as before, a smaller eps changes nothing.
+EXHAUSTED = 1e-8
+#: Products of eps_factor carry round-off.
+ROUND_OFF = 1.001
+
+
+@dataclass(frozen=True)
+class _Position:
+    """A position: the path's number, start and eps; form, result and active sets of the relaxation before, and the objective of
+    the branch that they named.
+    """
+
+    path: int
+    w: np.ndarray
+    eps: float
+    form: str = None
+    duals: NlpResult = None
+    sets: ActiveSets = None
+    named: float = None
+
+
+class Homotopy:
+    """One run along the path.
+
+    Parameters
+    ----------
+    setup : Setup
+    subsolves : Subsolves
+    gap : GapTest
+    branches : Branches or None
+        explores branches; with None the path is followed to its end
+    start : array
+        where the path begins
+
+    Attributes
+    ----------
+    end : NlpResult or None
+        the last usable relaxation
+    finished : bool
+        whether ``end`` is the relaxation of the last eps
+    """
+
+    def __init__(self, setup, subsolves, gap, branches, start):
+        self._c, self._options, self._after = setup.compiled, setup.options, setup.after
+        self._subsolves, self._gap, self._branches, self._start, self.run = subsolves, gap, branches, start, subsolves.run
+        form = self._options.relaxation
+        self._paths = AUTO[self._c.has_objective] if form == 'auto' else ((form,) * 2,)
+        self._recoveries = list(RECOVERIES)
+        self.end, self.finished = None, False
+
+    def follow(self):
+        """Run until the incumbent is settled or nothing is left to try."""
+        position = _Position(0, self._start, self._options.eps_init)
+        while position is not None:
+            self.run.eps = position.eps
+            relaxed = self._relax(position)
+            self._subsolves.keep_least_infeasible(relaxed.w)
+            position = (self._next if self._subsolves.usable(relaxed) else self._recover)(position, relaxed)
+
+    def _relax(self, position):
+        form = self._form(position)
+        duals = position.duals if position.eps <= WITH_MULTIPLIERS * ROUND_OFF and position.form == form else None
+        # all iterations of the solver for a cold start on the last path, or where the user has set their number
+        last_cold = duals is None and position.path + 1 == len(self._paths)
+        unlimited = last_cold or 'max_iter' in self._options.nlp_options
+        return self._subsolves.relax(
+            form, position.w, position.eps, duals, None if unlimited else self._options.relaxation_iterations
+        )
+
+    def _form(self, position):
+        first, later = self._paths[position.path]
+        return first if position.form is None else later
+
+    def restored(self, w):
+        """The nearest point that the restoration finds, with pairs as loose as at the start."""
+        return self._subsolves.restore(w, self._options.eps_init).w
+
+    def _recover(self, position, relaxed):
+        """The position after a relaxation that failed; None after the last recovery, or with a certified incumbent."""
+        self.finished = False
+        self._after(self.run)
+        if not self._recoveries or self._certified() or self._hopeless():
+            return None
+        if self._fails_at_once(position):
+            return self._begin(position.path + 1, "start again, other form", relaxed)
+        recovery, options = self._recoveries.pop(0), self._options
+        self._subsolves.note(recovery.note, relaxed.w)
+        self._gap.restart()
+        if recovery.other_form and self._c.widen() and self._branches is not None:
+            self._branches.forget()
+        eps = max(recovery.eps(options.eps_init, position.eps, options.eps_factor), options.eps_final)
+        path = (position.path + recovery.other_form) % len(self._paths)
+        return _Position(path, recovery.start(self._start, relaxed.w, self), eps)
+
+    def _fails_at_once(self, position):
+        """Whether a path fails at its first relaxation: there is no earlier one, and the forms differ most at their first eps."""
+        first = position.form is None and len(self._recoveries) == len(RECOVERIES)
+        return first and self._branches is not None and position.path + 1 < len(self._paths)
+
+    def _next(self, position, relaxed):
+        """Explore the branch that the relaxation names; the position after it, or None."""
+        self.end, options = relaxed, self._options
+        at = self._c.evaluate(relaxed.w)
+        product = float(np.max(at.G * at.H, initial=0.0))
+        sets = self._subsolves.sets(relaxed.w, self._subsolves.biactive(at))
+        self._gap.add(position.eps, at.f)
+        self.finished = position.eps <= options.eps_final * ROUND_OFF
+        exhausted = product <= EXHAUSTED and sets.same_sides(position.sets)
+        explores = self._worth_a_branch(position, sets)
+        named = self._branches.explore(relaxed, sets, self.finished or exhausted) if explores else None
+        self._after(self.run)
+        if explores and self._settled(position.named, named):
+            return None
+        if self.finished or (exhausted and explores and self._branches.tried(sets.zero)):
+            return self._other_path(position, relaxed)
+        # no change before eps falls below the largest product
+        eps = max(min(position.eps, product) * options.eps_factor, options.eps_final)
+        return _Position(position.path, relaxed.w, eps, self._form(position), relaxed, sets, named)
+
+    def _worth_a_branch(self, position, sets):
+        """Whether the active sets are clear enough for a branch NLP, or the last ones."""
+        if self._branches is None:
+            return False
+        undecided = np.count_nonzero(sets.gamma)
+        late = position.eps <= LATE * ROUND_OFF and undecided <= UNDECIDED * len(sets.gamma)
+        return self.finished or late or not undecided or sets.same_sides(position.sets)
+
+    def _settled(self, before, now):
+        """Whether the incumbent is certified, and closes the gap or is as good as the branches of the last two relaxations."""
+        if not self._certified():
+            return False
+        best = self.run.point.f
+        if self._gap.closed(best):
+            return True
+        return None not in (before, now) and self._gap.same(max(before, now), best)
+
+    def _other_path(self, position, relaxed):
+        """After a path without a certified point: the same path with wider bounds if they may be missing, else the next one."""
+        if self._branches is None:
+            return None
+        if self.run.point is not None and not self._certified():
+            # no small step may reach a better branch from here, but a neighbouring one may be
+            self._branches.try_neighbours()
+        if self._certified() or self._hopeless():
+            return None
+        wider = self._stopped_by_guide_bounds() and self._c.widen()
+        path = position.path + (not wider)
+        if path == len(self._paths):
+            return None
+        return self._begin(path, "nothing certified on this path, " + ("wider bounds" if wider else "other form"), relaxed)
+
+    def _begin(self, path, why, relaxed):
+        """The first position of another path."""
+        self._subsolves.note(why, relaxed.w)
+        self._gap.restart()
+        self._branches.forget()
+        return _Position(path, self._start, self._options.eps_init)
+
+    def _stopped_by_guide_bounds(self):
+        """Whether there is no feasible point, or one that only guide bounds keep from descending."""
+        return self.run.point is None or self.run.point.certificate.grade is Stationarity.LIMITED
+
+    def _hopeless(self):
+        """Whether nothing feasible was found, and no branch of so few pairs has a feasible point from the start."""
+        return self.run.point is None and self._branches is not None and self._branches.exhaust(self._start) is Verdict.NONE
+
+    def _certified(self):
+        return self.run.point is not None and self.run.point.certificate.certified

@@ -1,0 +1,163 @@
+"""The hybrid active-set algorithm (theory, section 4): Reg(eps) -> active sets -> branch NLP -> certificate.
+
+``Homotopy`` follows Reg(eps); the branches that it names give exactly complementary points, which the LPEC certifies or from which
+it descends into better branches (``Branches``).
+"""
+
+from pyomo_fesd.core import DeferredInterrupt, interrupt_handled
+from pyomo_fesd.mpcc.algorithm.branches import Branches
+from pyomo_fesd.mpcc.algorithm.coincidences import Coincidences
+from pyomo_fesd.mpcc.algorithm.feasible_start import feasible_start
+from pyomo_fesd.mpcc.algorithm.gap_test import GapTest
+from pyomo_fesd.mpcc.algorithm.homotopy import Homotopy
+from pyomo_fesd.mpcc.algorithm.search import Verdict
+from pyomo_fesd.mpcc.algorithm.start_points import start_point
+from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Run, Setup, Stop, Tolerances
+from pyomo_fesd.mpcc.algorithm.subsolves import Subsolves
+
+#: Other starts of a problem with few pairs, before it is called infeasible.
+RESTARTS = 3
+
+
+def few_pairs(compiled) -> bool:
+    """Whether a problem is so small that a thorough search costs little."""
+    return len(compiled.side_of) // 2 <= 50
+
+
+#: option ``lpec`` -> whether a full LPEC, cheap with few pairs, searches for better branches
+GLOBAL_LPEC_SEARCH = {
+    'auto': few_pairs,
+    'full': lambda compiled: True,
+    'reduced': lambda compiled: False,
+}
+
+
+class HybridSolver:
+    """Runs the algorithm on a compiled MPCC; ``run`` grows while it does."""
+
+    def __init__(self, setup: Setup):
+        self._setup, self._c, self._options, self.run = setup, setup.compiled, setup.options, Run()
+        self._subsolves = Subsolves(setup, Tolerances.of(self._options), self.run)
+        self._gap = GapTest(self._options.gap_tol * 1e-2, self._options.gap_tol)
+        self._branches = Branches(self._subsolves, self._gap, GLOBAL_LPEC_SEARCH[self._options.lpec](self._c))
+        self._coincidences = Coincidences(self._subsolves, self._branches)
+
+    def solve(self) -> Run:
+        """Run until a point is certified, nothing is left to try, or a limit is reached."""
+        run = self.run
+        if not self._options.warm_start:
+            # beyond the guide bounds there are more, and unwanted, solutions; the path widens them if it finds none within
+            self._c.narrow()
+        try:
+            with DeferredInterrupt() as interrupt, interrupt.raising():
+                run.outcome = MODES[self._options.mode](self)
+        except Stop as stop:
+            run.outcome = stop.outcome
+        except KeyboardInterrupt:
+            interrupt_handled()
+            run.outcome = Outcome.INTERRUPTED
+        finally:
+            self._c.widen()
+        if run.point is not None:
+            run.w = run.point.w
+        return run
+
+    def certify(self):
+        """The certificate of the start values, every order of changes that fall together tried."""
+        certificate = self._subsolves.judge(self._c.x0)
+        return self._coincidences.checked(self._c.x0, certificate) if certificate.certified else certificate
+
+    def _hybrid(self):
+        """The whole algorithm."""
+        if self._starts_at_a_solution():
+            return Outcome.SOLVED
+        if not (self._options.warm_start and self._from_values()):
+            self._path(self._c.x0, self._branches).follow()
+            if self._start_is_better():
+                self._branches.explore_from(self._c.x0, False)
+            if self.run.point is not None and self._c.has_objective:
+                self._branches.try_neighbours()
+        if self.run.point is None:
+            self._search_everywhere()
+        self._c.widen()
+        self._branches.even_out()
+        self._coincidences.settle()
+        point = self.run.point
+        if point is None:
+            return Outcome.INFEASIBLE
+        if not point.certificate.certified:
+            return Outcome.FEASIBLE
+        return Outcome.CERTIFIED if self._c.has_objective else Outcome.SOLVED
+
+    def _starts_at_a_solution(self):
+        """Whether there is no objective and the start is feasible already."""
+        if self._c.has_objective:
+            return False
+        narrow = self._c.widen()
+        self.run.point = feasible_start(self._c, self._subsolves, self._c.x0)
+        if narrow:
+            self._c.narrow()
+        return self.run.point is not None
+
+    def _relaxation_only(self):
+        """The homotopy alone, for comparison: its end is neither exactly complementary nor certified."""
+        path = self._path(self._c.x0, None)
+        try:
+            path.follow()
+        finally:
+            # the last relaxation counts also if a limit stopped the path
+            end = path.end
+            if end is not None:
+                self.run.point = Point(end, self._c.evaluate(end.w).f, self._subsolves.measure(end.w))
+        if end is not None and (path.finished or self.run.point.certificate.feasible):
+            return Outcome.RELAXED
+        self.run.point = None
+        return Outcome.INFEASIBLE
+
+    def _path(self, start, branches):
+        return Homotopy(self._setup, self._subsolves, self._gap, branches, start)
+
+    def _from_values(self):
+        """Whether the branch that the start values name leads to a certified point."""
+        self._subsolves.keep_least_infeasible(self._c.x0)
+        self._branches.explore_from(self._c.x0, False)
+        return self.run.point is not None and self.run.point.certificate.certified
+
+    def _start_is_better(self):
+        """Whether the path led to no certified point, or to one above a start that is feasible."""
+        point, start = self.run.point, self._c.x0
+        if point is None or not point.certificate.certified:
+            return True
+        return point.f > self._c.evaluate(start).f and self._subsolves.measure(start).feasible
+
+    def _search_everywhere(self):
+        """Without a feasible point on the path: search the branches, for few pairs also from other starts.
+
+        At the end the restoration shows the rows and pairs that contradict each other.
+        """
+        hopeless = self._branches.exhaust(self._c.x0) is Verdict.NONE
+        if not hopeless:
+            self._branches.search(self.run.w, self._c.x0)
+        for number in range(1, 1 + RESTARTS * self._may_differ(hopeless)):
+            if self.run.point is not None:
+                return
+            start = start_point(self._c, self._c.x0, self._options.seed, number)
+            self._subsolves.note("start elsewhere", start)
+            if hopeless and self._branches.exhaust(start) is not Verdict.FOUND:
+                continue
+            self._gap.restart()
+            self._branches.forget()
+            self._path(start, self._branches).follow()
+            if self.run.point is None:
+                self._branches.search(self.run.w, start)
+        if self.run.point is None:
+            self.run.w = self._subsolves.restore(self.run.w, self._options.eps_final).w
+            self._branches.explore_from(self.run.w, True)
+
+    def _may_differ(self, hopeless):
+        """Whether another start may have another answer: one search of all branches is a proof where everything is linear."""
+        return few_pairs(self._c) and not (hopeless and self._c.linear)
+
+
+#: option ``mode`` -> the method that runs
+MODES = {'hybrid': HybridSolver._hybrid, 'relaxation': HybridSolver._relaxation_only}

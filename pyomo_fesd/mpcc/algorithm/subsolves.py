@@ -1,0 +1,185 @@
+"""Single NLPs and LPECs of the hybrid algorithm: each is checked against the limits, timed, counted and logged."""
+
+import time
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from pyomo_fesd.core import DeferredInterrupt, phase
+from pyomo_fesd.mpcc.algorithm.state import LogEntry, Outcome, Run, Setup, Stop, Tolerances
+from pyomo_fesd.mpcc.nlp import nlp_solver
+from pyomo_fesd.mpcc.subproblems import RELAXATIONS, Branch, Lpec, Restoration, active_sets, certify_point, measure, settle
+
+#: With both sides within this factor of the root of the largest product, a pair is undecided.
+BIACTIVE = 3.0
+#: HiGHS for an LPEC that only suggests a branch: the first solution is enough, in this share of the time that the NLPs took.
+SUGGESTION = {'mip_max_nodes': 100, 'mip_max_improving_sols': 1, 'presolve': 'off'}
+SHARE, LEAST_TIME = 0.2, 0.2
+#: Statuses of a problem that an NLP solver found infeasible: the model's own rows may hold there, the pairs do not.
+INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
+#: Iterations that an NLP may use; a relaxation without multipliers to start from may use more.
+COLD = 4
+ITERATIONS = {
+    'relaxation': lambda options: COLD * options.relaxation_iterations,
+    'branch': lambda options: options.branch_iterations,
+}
+
+
+class Subsolves:
+    """The NLPs and LPECs of one run on a compiled MPCC, built when they are first needed."""
+
+    def __init__(self, setup: Setup, tolerances: Tolerances, run: Run):
+        self.compiled, self.tolerances, self.run = setup.compiled, tolerances, run
+        self._c, self._setup, self._options = setup.compiled, setup, setup.options
+        self._sides, self._nlps, self._solver = setup.cache.sides, setup.cache.nlps, nlp_solver(setup.options.nlp_solver)
+        self._lpec = Lpec(self._c, self._sides, self._options.lpec_options.value(), setup.deadline)
+
+    # called by the algorithm
+
+    def relax(self, form, w, eps, duals, max_iter=None):
+        """Solve Reg(eps) in a form of ``RELAXATIONS``, from ``w`` and perhaps a result of the same form."""
+        kind, terms = RELAXATIONS[form]
+        nlp = self._build(form, lambda make: kind(self._c, self._sides, terms, make), 'relaxation')
+        return self._nlp('relaxation', eps, lambda: nlp.solve(w, eps, duals, max_iter))
+
+    def restore(self, w, eps):
+        """Solve the restoration NLP."""
+        nlp = self._build('restoration', lambda make: Restoration(self._c, self._sides, make), 'relaxation')
+        return self._nlp('restoration', eps, lambda: nlp.solve(w, eps))
+
+    def branch(self, w, zero, equal, weight, **more):
+        """Solve a branch NLP; None if it contradicts the bounds or ends without a usable point."""
+        result = self.attempt(w, zero, equal, weight, **more)
+        return result if result is not None and self.usable(result) else None
+
+    def node(self, w, zero, max_iter):
+        """Solve a branch NLP in which pairs may be open; its usable result or None, and whether it was found infeasible."""
+        result = self.attempt(w, zero, None, 1.0, max_iter=max_iter)
+        if result is None:
+            return None, True
+        if self.usable(result):
+            return result, False
+        return None, result.status in INFEASIBLE or self._branches().infeasible(zero)
+
+    def attempt(self, w, zero, equal, weight, **more):
+        """The result of a branch NLP, usable or not; None if the branch contradicts the bounds."""
+        return self._nlp('branch', 0.0, lambda: self._branches().solve(w, zero, equal, weight, **more))
+
+    def _branches(self):
+        return self._build('branch', lambda make: Branch(self._c, self._sides, make), 'branch')
+
+    def lpec(self, w, sets, Delta, equal=None, **more):
+        """Solve an LPEC for a direction to a better branch."""
+        with self._timed('lpec') as started:
+            result = self._lpec.solve(w, sets, Delta, equal, **more)
+        self._count(result)
+        self._log('lpec', 0.0, w, 0, f'{result.value:.1e}' if result.solved else 'unsolved', started)
+        return result
+
+    def suggestion(self, w, sets, Delta):
+        """Solve an LPEC that may stop early."""
+        spent = sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch'))
+        return self.lpec(w, sets, Delta, limits=SUGGESTION | {'time_limit': max(LEAST_TIME, SHARE * spent)})
+
+    def certify(self, nlp, equal):
+        """Certify the solution of a branch NLP, whatever the limits; HiGHS stops at the deadline."""
+        started = time.perf_counter()
+        with phase(self._setup.timer, 'lpec'):
+            certificate = certify_point(self._c, self._lpec, nlp.w, self.tolerances, equal, -nlp.lam_g)
+        if certificate.lpec is not None:
+            self._count(certificate.lpec)
+        self._log('certificate', 0.0, nlp.w, 0, certificate.grade.name, started)
+        return certificate
+
+    def judge(self, w):
+        """Certify any point."""
+        return certify_point(self._c, self._lpec, w, self.tolerances)
+
+    def measure(self, w):
+        """The residuals of a relaxation's solution, or of the start."""
+        return measure(self._c, w, self.tolerances)
+
+    def keep_least_infeasible(self, w):
+        """Keep the point to report if no feasible one is found."""
+        if self.run.w is None or self.violation(w) < self.violation(self.run.w):
+            self.run.w = w
+
+    def note(self, message, w):
+        """Log a message without running a solver."""
+        self._log('recovery', 0.0, w, 0, message, time.perf_counter())
+
+    def usable(self, result):
+        """Whether an NLP's point can be used: solved, or stopped where the model's constraints hold, but not as infeasible."""
+        return result.solved or (result.status not in INFEASIBLE and self.violation(result.w) <= self.tolerances.feasibility)
+
+    def violation(self, w):
+        """The largest violation of rows and bounds."""
+        rows, bounds = self._c.violations(w)
+        return float(max(rows.max(initial=0.0), bounds.max(initial=0.0)))
+
+    def sets(self, w, tolerance):
+        """Active sets at ``w``, settled; with ``tolerance`` for bi-active pairs."""
+        at = self._c.evaluate(w)
+        sets = active_sets(at.G, at.H, tolerance)
+        return replace(sets, zero=settle(self._c, self._sides, w, sets.zero))
+
+    def biactive(self, at):
+        """Below this both sides of a pair may be zero at the solution: O(sqrt) of the largest product left (eq. 16)."""
+        return max(BIACTIVE * np.sqrt(np.max(at.G * at.H, initial=0.0)), self.tolerances.biactive)
+
+    # how they run
+
+    def _build(self, name, construct, kind):
+        if name not in self._nlps:
+            with self._timed('build'):
+                self._nlps[name] = construct(partial(self._make, kind))
+        return self._nlps[name]
+
+    def _make(self, kind, name, x, p, f, g, budget=None, derivatives=None):
+        """An NLP solver of the user's choice, with the limits of its kind."""
+        options = self._options
+        ours = {'max_iter': ITERATIONS[kind](options), 'tol': getattr(options, f'{kind}_tol')} | (budget or {})
+        return self._solver(name, x, p, f, g, ours, self._setup.deadline, derivatives, options.nlp_options.value())
+
+    def _nlp(self, kind, eps, solve):
+        with self._timed(kind) as started:
+            result = solve()
+        if result is not None:
+            self.run.counts.nlps += 1
+            self.run.counts.iterations += result.iterations
+            self._log(kind, eps, result.w, result.iterations, result.status, started)
+        return result
+
+    @contextmanager
+    def _timed(self, kind):
+        """Check the limits, then time the body; yields the time at which it begins."""
+        if self._setup.deadline.expired():
+            raise Stop(Outcome.TIME_LIMIT)
+        if self.run.counts.iterations >= self._options.max_iterations:
+            raise Stop(Outcome.ITERATION_LIMIT)
+        with DeferredInterrupt() as interrupt, phase(self._setup.timer, kind), interrupt.raising():
+            yield time.perf_counter()
+
+    def _count(self, result):
+        self.run.counts.lpecs += 1
+        self.run.counts.binaries = max(self.run.counts.binaries, result.binaries)
+
+    def _log(self, kind, eps, w, iterations, status, started):
+        at = self._c.evaluate(w)
+        low = np.minimum(at.G, at.H)
+        entry = LogEntry(
+            kind,
+            eps,
+            self._c.objective(at.f),
+            violation=float(max(self.violation(w), -low.min(initial=0.0))),
+            complementarity=float(np.abs(low).max(initial=0.0)),
+            biactive=int(np.count_nonzero(np.maximum(at.G, at.H) <= self.biactive(at))),
+            iterations=iterations,
+            status=status,
+            seconds=time.perf_counter() - started,
+            w=w,
+        )
+        self.run.steps.append(entry)
+        self._setup.show(entry)

@@ -1,0 +1,286 @@
+"""The MPCC as data and functions, from which relaxations, branches and the LPEC are formed.
+
+Everything here is in the solver's own scaling (see ``scaling``); ``values``, ``objective`` and ``absolute`` convert to the units of
+the model.  ``MpccFunctions`` can be pickled and sent to another process: with the casadi graph, without the Pyomo components.
+"""
+
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from pyomo_fesd.mpcc.compile.derivatives import ModelDerivatives
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Values at one point w (numpy vectors; see ``MpccFunctions``)."""
+
+    f: float
+    g: np.ndarray
+    G: np.ndarray
+    H: np.ndarray
+    eta: np.ndarray
+
+
+@dataclass
+class MpccData:
+    """The bounds, start values and facts of an MPCC besides its functions.
+
+    Attributes
+    ----------
+    lbx, ubx : arrays (n), the variables' bounds with the signs that plain-variable sides imply
+    lbg, ubg : arrays (m)
+    side_of : int array (2q), equal numbers for equal sides among G (first q) and H
+    guided : bool array (n), variables with guide bounds, whose own bounds belong to the method
+    guide_lbx, guide_ubx : arrays (n), bounds in the homotopy, tighter for these variables
+    x0 : array (n), the model's values projected to the bounds
+    parameters : array (l), values of the parameters that a new solve may change
+    missing : int, number of variables without a value
+    sign : +1.0, or -1.0 for a model that maximises (f is always minimised)
+    has_objective : bool
+    scale : Scale
+    neighbours : list of NeighbourIndices
+    coincidences : list of CoincidenceIndices
+    followers : FollowerIndices
+    tentative : bool array, decisions that are dropped where they leave no solution
+    """
+
+    lbx: np.ndarray
+    ubx: np.ndarray
+    lbg: np.ndarray
+    ubg: np.ndarray
+    side_of: np.ndarray
+    guided: np.ndarray
+    guide_lbx: np.ndarray
+    guide_ubx: np.ndarray
+    x0: np.ndarray
+    parameters: np.ndarray
+    missing: int
+    sign: float
+    has_objective: bool
+    scale: object
+    neighbours: list
+    coincidences: list
+    followers: object
+    tentative: np.ndarray
+
+
+@dataclass(frozen=True)
+class NeighbourIndices:
+    """A ``NeighbourBranch`` by positions of pairs and variables.
+
+    Attributes
+    ----------
+    targets, sources : int arrays, pairs; the first get the zero sides of the second
+    ended : int array, pairs whose first side becomes zero
+    short : int array
+        variables; unless one of them is at its lower bound the branch is not tried (none: always)
+    starts : int array, variables that start elsewhere
+    at : array, their start values
+    """
+
+    targets: np.ndarray
+    sources: np.ndarray
+    ended: np.ndarray
+    short: np.ndarray
+    starts: np.ndarray
+    at: np.ndarray
+
+
+@dataclass(frozen=True)
+class MoveIndices:
+    """Pairs that change if a change moves; ``targets`` get the zero sides of ``sources``, the first side of ``ended`` becomes 0."""
+
+    targets: np.ndarray
+    sources: np.ndarray
+    ended: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ChangeIndices:
+    """A ``Change`` by positions of pairs.
+
+    Attributes
+    ----------
+    pairs, partners : int arrays
+    later, earlier : MoveIndices
+    """
+
+    pairs: np.ndarray
+    partners: np.ndarray
+    later: MoveIndices
+    earlier: MoveIndices
+
+
+@dataclass(frozen=True)
+class CoincidenceIndices:
+    """A ``Coincidence`` by positions of pairs and variables (None: there is no such place)."""
+
+    changes: tuple
+    later: int | None
+    earlier: int | None
+    fixed: bool
+
+
+@dataclass(frozen=True)
+class FollowerIndices:
+    """All ``Follower`` by positions of pairs.
+
+    Attributes
+    ----------
+    pairs, leaders : int arrays
+    swapped : bool array
+    """
+
+    pairs: np.ndarray
+    leaders: np.ndarray
+    swapped: np.ndarray
+
+
+class MpccFunctions:
+    """A compiled MPCC; attributes of ``MpccData`` are attributes here too.
+
+    Parameters
+    ----------
+    x, p : SX, symbols of the variables w (n) and of the parameters (l)
+    outputs : list of SX, in terms of these: f, penalty, g (m), G, H (q), eta, equal (one each decision)
+    data : MpccData
+    variables : list of VarData, length n
+    constraints : list of ConstraintData, length m (rows of g)
+    conditions : list of Condition, length q
+    decisions : list of Decision
+    model_values : ModelValues
+        reads those data again that a new solve may find changed
+
+    Attributes
+    ----------
+    x : SX (n);  p : SX (l);  f, penalty : SX scalars;  g : SX (m);  G, H : SX (q);  eta, equal : SX (one each decision)
+    """
+
+    NAMES = ('f', 'penalty', 'g', 'G', 'H', 'eta', 'equal')
+
+    def __init__(self, x, p, outputs, data, variables=(), constraints=(), conditions=(), decisions=(), model_values=None):
+        self._data = data
+        self.__dict__.update(vars(data))
+        self.variables, self.constraints, self.conditions, self.decisions = variables, constraints, conditions, decisions
+        self._model_values = model_values
+        self.x, self.p = x, p
+        for name, expression in zip(self.NAMES, outputs):
+            setattr(self, name, expression)
+        self._values = ca.Function('values', [self.x, self.p], [self.f, self.g, self.G, self.H, self.eta])
+
+    @cached_property
+    def derivatives(self):
+        """Derivatives of all functions, built when they are first needed."""
+        return ModelDerivatives(self)
+
+    @cached_property
+    def _equal(self):
+        return ca.Function('equal', [self.x, self.p], [ca.densify(self.equal)])
+
+    @cached_property
+    def _gradients(self):
+        return ca.Function('gradients', [self.x, self.p], [self.derivatives.f, *self.derivatives.parts])
+
+    @cached_property
+    def linear(self):
+        """Whether all rows and sides are linear."""
+        rows = ca.vertcat(self.g, self.G, self.H)
+        return not (rows.numel() and any(ca.which_depends(rows, self.x, 2, True)))
+
+    def __getstate__(self):
+        # casadi pickles functions, not expressions
+        outputs = [getattr(self, name) for name in self.NAMES]
+        return ca.Function('mpcc', [self.x, self.p], outputs), self._data
+
+    def __setstate__(self, state):
+        graph, data = state
+        x, p = ca.SX.sym('w', graph.size1_in(0)), ca.SX.sym('p', graph.size1_in(1))
+        self.__init__(x, p, graph(x, p), data)
+
+    def refresh(self):
+        """Read bounds, start and parameters from the model again; see ``ModelValues.read``."""
+        self._data = replace(self._data, **self._model_values.read())
+        self.__dict__.update(vars(self._data))
+
+    def narrow(self):
+        """Let branches, too, have the lower guide bounds."""
+        self.lbx = self.guide_lbx
+
+    def widen(self):
+        """Undo ``narrow``; returns whether that makes a difference."""
+        narrow, self.lbx = self.lbx, self._data.lbx
+        return bool((narrow > self.lbx).any())
+
+    @contextmanager
+    def vanishing(self, variable):
+        """Within the body, the least value of a variable is 0, and the others have their own bounds."""
+        kept, self.lbx = self.lbx, self._data.lbx.copy()
+        self.lbx[variable] = 0.0
+        try:
+            yield
+        finally:
+            self.lbx = kept
+
+    @property
+    def nonzeros(self):
+        """Number of entries of each Jacobian."""
+        names = ('objective', 'constraints', 'G', 'H', 'decisions')
+        return {name: self._gradients.sparsity_out(i).nnz() for i, name in enumerate(names)}
+
+    def evaluate(self, w) -> Evaluation:
+        """f, g, G, H and eta at ``w``."""
+        f, g, G, H, eta = (np.asarray(v, dtype=float).ravel() for v in self._values(w, self.parameters))
+        return Evaluation(float(f[0]), g, G, H, eta)
+
+    def decided(self, w):
+        """The residuals of the decisions' equations at ``w``."""
+        return np.asarray(self._equal(w, self.parameters), dtype=float).ravel()
+
+    def gradients(self, w):
+        """Gradient of f (array) and Jacobians of g, G, H and the decisions' equations (scipy csr) at ``w``."""
+        grad, *jacobians = self._gradients(w, self.parameters)
+        return np.asarray(grad, dtype=float).ravel(), *(csr(J) for J in jacobians)
+
+    def violations(self, w, at=None):
+        """How much each row (m) and each bound (n) is violated at ``w``."""
+        at = at or self.evaluate(w)
+        rows = np.maximum(np.maximum(self.lbg - at.g, at.g - self.ubg), 0.0)
+        return rows, np.maximum(np.maximum(self.lbx - w, w - self.ubx), 0.0)
+
+    def values(self, w):
+        """The model's values of the variables."""
+        return w / self.scale.x
+
+    def objective(self, f):
+        """The model's objective, in its own sense."""
+        return self.sign * (f / self.scale.f + self.scale.offset)
+
+    def minimised(self, objective):
+        """f of the model's objective."""
+        return (self.sign * objective - self.scale.offset) * self.scale.f
+
+    def absolute(self, rows, bounds, sides):
+        """Violations of rows (m) and bounds (n) and values of sides (2q) in the model's units."""
+        return rows / self.scale.g, bounds / self.scale.x, sides / self.scale.sides
+
+
+def csr(J):
+    """casadi DM to scipy csr."""
+    colptr, row = np.array(J.sparsity().colind()), np.array(J.sparsity().row())
+    data = np.array(J.nonzeros(), dtype=float)
+    return sparse.csc_matrix((data, row, colptr), shape=J.shape).tocsr()
+
+
+def csr_pattern(J):
+    """Ones where casadi's J has entries, as scipy csr."""
+    return csr(ca.DM(J.sparsity(), 1.0))
+
+
+def take(column, positions):
+    """The elements of a casadi column at ``positions``, as a column; for casadi an empty selection of one element is a row."""
+    return column[[int(k) for k in positions]] if len(positions) else ca.SX(0, 1)

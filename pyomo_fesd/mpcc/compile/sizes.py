@@ -1,0 +1,102 @@
+"""Sizes of variables and rows, for problems whose numbers are far from 1.
+
+Tolerances are absolute in the solver's scale, so a state of size 1e-9, or a rate in a process that takes a year, would be lost in
+them.  The size of a variable is, in this order,
+
+* the inverse of its factor, where the user gives one;
+* its largest start value, or that of the variables ``alike`` (the same quantity at other places), unless that is small: what is
+  zero at a solution starts at any small number in the next solve;
+* by its rows: s_j = (min_i max_i)^(1/2) of max(|b_i|, max_k |J_ik| s_k)/|J_ij| over the rows i with terms of known size.
+
+Variables of a mild size keep the factor 1, and so do rows whose largest gradient entry is mild; others get the inverse, as a power
+of 2, which no rounding follows.
+
+Takes: the Jacobian J and the constants b of all rows and sides at the start.
+Leaves: factors.
+Does not apply: to the objective.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+#: Sizes of variables, and largest gradient entries of rows, that need no factor.
+MILD_SIZES, MILD_ROWS = (1e-3, 2e6), (1e-3, 1e6)
+#: Sizes beyond these are start values without a meaning.
+SIZES = (1e-30, 1e30)
+#: Sweeps through the rows.
+SWEEPS = 20
+
+
+def without_small(start: np.ndarray) -> np.ndarray:
+    """Return start values with 0 in place of those that may be zero."""
+    return np.where(np.abs(start) < MILD_SIZES[0], 0.0, start)
+
+
+def variable_factors(J, b: np.ndarray, start: np.ndarray, bounds: tuple, given: np.ndarray, alike: Sequence) -> np.ndarray:
+    """Return the factors of the variables.
+
+    Parameters
+    ----------
+    J : csr (rows, n)
+    b : array (rows)
+        constants of the linearised rows
+    start : array (n)
+    bounds : (array, array)
+        which are mild where a variable may have any value between them
+    given : array (n)
+        the user's factors; 1 where there is none
+    alike : list of int arrays
+        positions of variables that have one size
+    """
+    group = np.arange(start.size)
+    for positions in alike:
+        group[positions] = positions[0]
+    sizes = _largest_of_group(np.abs(without_small(start)), group)
+    sizes[given != 1.0] = 1.0 / given[given != 1.0]
+    bounded = np.maximum(np.abs(bounds[0]), np.abs(bounds[1]))
+    mild = (sizes == 0) & (bounded >= MILD_SIZES[0]) & (bounded <= MILD_SIZES[1])
+    sizes[mild] = bounded[mild]
+    sizes = np.minimum(_spread(abs(J).tocsr(), np.abs(b), sizes, group), np.where(bounded > 0, bounded, np.inf))
+    sizes = np.where(sizes > 0, np.maximum(sizes, _largest_of_group(np.abs(start), group)), 0.0)
+    return np.where(given != 1.0, given, _factors(sizes, MILD_SIZES))
+
+
+def row_factors(J, given: np.ndarray) -> np.ndarray:
+    """Return the factors of rows with the Jacobian ``J`` in scaled variables; one of the user (not 1) is kept."""
+    largest = abs(J).max(axis=1).toarray().ravel() if J.shape[1] else np.zeros(J.shape[0])
+    return np.where(given != 1.0, given, _factors(largest, MILD_ROWS))
+
+
+def _factors(sizes, mild):
+    """1/size as a power of 2; 1 for mild sizes and for those that are unknown."""
+    extreme = np.isfinite(sizes) & (sizes > 0) & ((sizes < mild[0]) | (sizes > mild[1]))
+    return np.where(extreme, np.exp2(-np.round(np.log2(np.where(extreme, sizes, 1.0)))), 1.0)
+
+
+def _largest_of_group(values, group):
+    values = np.where((values >= SIZES[0]) & (values <= SIZES[1]), values, 0.0)
+    largest = np.zeros(values.size)
+    np.maximum.at(largest, group, values)
+    return largest[group]
+
+
+def _spread(J, b, sizes, group):
+    """Give variables of size 0 that of the terms beside them."""
+    rows = np.repeat(np.arange(J.shape[0]), np.diff(J.indptr))
+    used = np.isfinite(J.data) & (J.data > 0)
+    i, j, entries = rows[used], J.indices[used], J.data[used]
+    b = np.where(np.isfinite(b), b, 0.0)
+    for _ in range(SWEEPS):
+        terms = b.copy()
+        np.maximum.at(terms, i, entries * sizes[j])
+        open_ = (sizes[j] == 0) & (terms[i] > 0)
+        if not open_.any():
+            break
+        found = terms[i[open_]] / entries[open_]
+        low, high = np.full(sizes.size, np.inf), np.zeros(sizes.size)
+        np.minimum.at(low, group[j[open_]], found)
+        np.maximum.at(high, group[j[open_]], found)
+        new = np.where(high > 0, np.sqrt(np.where(high > 0, low, 0.0)) * np.sqrt(high), 0.0)[group]
+        sizes = np.where(sizes == 0, new, sizes)
+    return sizes

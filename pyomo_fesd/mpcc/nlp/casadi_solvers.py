@@ -1,0 +1,241 @@
+"""The NLP solvers inside casadi's wheel: Ipopt (the default) and Uno."""
+
+import ctypes
+import io
+import os
+from abc import abstractmethod
+from dataclasses import replace
+from functools import cache
+
+import casadi as ca
+import numpy as np
+from pyomo.common.tee import capture_output
+
+from pyomo_fesd.core import REDIRECTION, DeferredInterrupt
+from pyomo_fesd.mpcc.compile import automatic
+from pyomo_fesd.mpcc.nlp.deadline import Deadline
+from pyomo_fesd.mpcc.nlp.solver import (
+    IPOPT,
+    IPOPT_WARM,
+    NlpResult,
+    NlpSolver,
+    check_options,
+    rows_with_variables,
+    violated,
+)
+
+#: Variables and rows from which Uno's sequential quadratic programming, much the better of its presets, gets too slow.
+UNO_LARGE = 2000
+#: Ipopt's option names in Uno's.
+UNO_NAMES = {
+    'max_iter': ('max_iterations',),
+    'tol': ('primal_tolerance', 'dual_tolerance'),
+    'mu_init': ('barrier_initial_parameter',),
+    'bound_push': ('barrier_push_variable_to_interior_k1',),
+    'bound_frac': ('barrier_push_variable_to_interior_k2',),
+}
+#: casadi's status where it is more specific than Uno's own "not optimal point".
+UNIFIED = {'SOLVER_RET_LIMITED': 'iteration or time limit', 'SOLVER_RET_NAN': 'error'}
+#: Statuses of the tiny problem that only refused options can cause.
+REFUSED = ('Invalid_Option', 'error')
+#: Statuses with which Ipopt leaves its iteration counter unset.
+NOT_BEGUN = ('Not_Enough_Degrees_Of_Freedom', 'Invalid_Problem_Definition', 'Invalid_Option')
+#: Uno's own numbers for the types of its options.
+UNO_TYPES = {0: int, 1: float, 2: bool, 3: str}
+
+
+class _StopCallback(ca.Callback):
+    """Asks the solver to stop at the deadline, at the iteration limit of a call, or at Ctrl-C."""
+
+    def __init__(self, n, m, p, deadline):
+        super().__init__()
+        self._sizes, self._deadline, self.left, self.interrupt = (n, m, p), deadline, np.inf, DeferredInterrupt()
+        self.construct('watch', {})
+
+    def get_n_in(self):
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self):
+        return 1
+
+    def get_sparsity_in(self, i):
+        n, m, p = self._sizes
+        length = {'x': n, 'lam_x': n, 'f': 1, 'g': m, 'lam_g': m, 'lam_p': p}[ca.nlpsol_out(i)]
+        return ca.Sparsity.dense(length, 1)
+
+    def has_eval_buffer(self):
+        # avoids copies of the point, which is not used
+        return True
+
+    def eval_buffer(self, arg, res):
+        self.left -= 1
+        res[0].cast('d')[0] = self.left < 0 or self._deadline.expired() or self.interrupt.pressed
+        return 0
+
+
+class _CasadiNlp(NlpSolver):
+    """Shared by both: casadi's ``nlpsol``.  See ``NlpSolver``."""
+
+    #: Name of casadi's plug-in, options that silence it, whether it accepts our derivatives.
+    PLUGIN, SILENT, TAKES_DERIVATIVES = '', {}, False
+    #: Keyword by which the user gives its options.
+    GIVEN = 'nlp_options'
+
+    @staticmethod
+    def missing(name):
+        """The reason why casadi does not have it, or None."""
+        return None if ca.has_nlpsol(name) else f"casadi {ca.__version__} was built without it"
+
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
+        self._size, options = x.numel() + g.numel(), options or {}
+        check_options(self.PLUGIN, options, self._refusal, self.GIVEN)
+        self._watch = _StopCallback(x.numel(), g.numel(), p.numel(), deadline or Deadline())
+        # casadi's warnings would go to the stderr of the whole process
+        settings = {'print_time': False, 'show_eval_warnings': False, 'iteration_callback': self._watch}
+        if self.TAKES_DERIVATIVES:
+            settings |= _functions(x, p, f, g, derivatives or automatic(x, f, g))
+        self._make = lambda ours: ca.nlpsol(name, self.PLUGIN, {'x': x, 'p': p, 'f': f, 'g': g}, settings | {self.PLUGIN: ours})
+        self._options, self._made = (budget, options), {}
+        self._f = ca.Function('f', [x, p], [f])
+
+    @abstractmethod
+    def _settings(self, budget, options, warm=False):
+        """Options of the solver, for a start without or with multipliers."""
+
+    def _status(self, stats):
+        """The solver's own status from casadi's statistics."""
+        return stats['return_status']
+
+    def _refusal(self, options):
+        """The solver's message if it refuses these options on a tiny problem, else None."""
+        x, messages = ca.SX.sym('x'), io.StringIO()
+        with REDIRECTION, capture_output(messages, capture_fd=True):
+            try:
+                settings = {'print_time': False, self.PLUGIN: self._settings({}, options | self.SILENT)}
+                solver = ca.nlpsol('probe', self.PLUGIN, {'x': x, 'f': (x - 1) ** 2}, settings)
+                solver(x0=0.0)
+            except (RuntimeError, ValueError) as error:
+                return f'{messages.getvalue()} {str(error).splitlines()[-1]}'
+        return "invalid value" if self._status(solver.stats()) in REFUSED else None
+
+    def _solver_for(self, warm):
+        """The solver for a start without or with multipliers, made when it is first needed."""
+        if warm not in self._made:
+            self._made[warm] = self._make(self._settings(*self._options, warm))
+        return self._made[warm]
+
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
+        """Solve from ``w0``; see ``NlpSolver``."""
+        solver = self._solver_for(duals is not None)
+        self._watch.left = np.inf if max_iter is None else max_iter
+        start = {} if duals is None else {'lam_x0': duals.lam_x, 'lam_g0': duals.lam_g}
+        with DeferredInterrupt() as self._watch.interrupt:
+            try:
+                result = solver(x0=w0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg, **start)
+            except RuntimeError as error:
+                if 'An exception was raised in the solver' not in str(error):
+                    raise
+                return self._failed(w0, p, len(lbg))
+        stats = solver.stats()
+        w, lam_g, lam_x = (np.asarray(result[key], dtype=float).ravel() for key in ('x', 'lam_g', 'lam_x'))
+        return NlpResult(w, float(result['f']), self._status(stats), _iterations(stats), lam_g, lam_x)
+
+    def _failed(self, w0, p, m, status='error'):
+        """The result if the solver returns no point."""
+        w = np.array(w0, dtype=float)
+        return NlpResult(w, float(self._f(w, p)), status, 0, np.zeros(m), np.zeros(len(w)))
+
+
+class CasadiIpopt(_CasadiNlp):
+    """Ipopt.  See ``NlpSolver``."""
+
+    PLUGIN, SILENT, TAKES_DERIVATIVES = 'ipopt', {'print_level': 0, 'sb': 'yes'}, True
+
+    def _settings(self, budget, options, warm=False):
+        return IPOPT | budget | (IPOPT_WARM if warm else {}) | options
+
+
+class PlainIpopt(CasadiIpopt):
+    """Ipopt with its own defaults.  See ``NlpSolver``."""
+
+    GIVEN = 'options'
+
+    def _settings(self, budget, options, warm=False):
+        return budget | options
+
+
+class CasadiUno(_CasadiNlp):
+    """Uno as 'filtersqp' on small problems and 'ipopt' on large ones; ``preset`` is one of its options.  See ``NlpSolver``."""
+
+    PLUGIN, SILENT = 'uno', {'logger': 'SILENT'}
+
+    @staticmethod
+    def missing(name):
+        """The reason why casadi's Uno cannot be used, or None."""
+        try:
+            return _CasadiNlp.missing(name) or (_uno() and None)
+        except (OSError, AttributeError) as error:
+            return f"casadi {ca.__version__} has none with a C interface ({error})"
+
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
+        # with a violated row without variables Uno's QP solver may never return, whatever the limits
+        self._varying, self._g = rows_with_variables(g, x), ca.Function('g', [x, p], [ca.densify(g)])
+        super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, derivatives, options)
+
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
+        """Solve from ``w0``; see ``NlpSolver``."""
+        varying = self._varying
+        g, lam_g = self._g(w0, p).full().ravel(), np.zeros(len(varying))
+        if np.any(violated(g, lbg, ubg) & ~varying):
+            return self._failed(w0, p, len(varying), 'infeasible')
+        if duals is not None:
+            duals = replace(duals, lam_g=duals.lam_g[varying])
+        result = super().solve(w0, p, lbx, ubx, lbg[varying], ubg[varying], duals, max_iter)
+        lam_g[varying] = result.lam_g
+        return replace(result, lam_g=lam_g)
+
+    def _settings(self, budget, options, warm=False):
+        # options of a wrong type are dropped by casadi without a message
+        ours = {new: value for old, value in budget.items() for new in UNO_NAMES.get(old, ())}
+        ours |= {'logger': 'SILENT', 'preset': 'filtersqp' if self._size < UNO_LARGE else 'ipopt'}
+        return {name: _uno_type(name)(value) for name, value in (ours | options).items()}
+
+    def _status(self, stats):
+        return UNIFIED.get(stats['unified_return_status'], stats['return_status'])
+
+
+def _functions(x, p, f, g, d):
+    """casadi's options for derivatives."""
+    return {
+        'grad_f': ca.Function('nlp_grad_f', [x, p], [f, ca.densify(d.gradient)], ['x', 'p'], ['f', 'grad_f_x']),
+        'jac_g': ca.Function('nlp_jac_g', [x, p], [g, d.jacobian], ['x', 'p'], ['g', 'jac_g_x']),
+        'hess_lag': ca.Function(
+            'nlp_hess_l', [x, p, d.lam_f, d.lam_g], [d.hessian], ['x', 'p', 'lam_f', 'lam_g'], ['triu_hess_gamma_x_x']
+        ),
+    }
+
+
+def _iterations(stats):
+    return int(stats['iter_count']) if stats['return_status'] not in NOT_BEGUN else 0
+
+
+def _uno_type(name):
+    """The type of Uno's option ``name``, according to its C library."""
+    uno, solver = _uno()
+    kind = uno.uno_get_solver_option_type(solver, name.encode())
+    if kind not in UNO_TYPES:
+        raise ValueError("unknown option")
+    return UNO_TYPES[kind]
+
+
+@cache
+def _uno():
+    """Uno's C library and a solver of its own, or an OSError."""
+    folder = os.path.dirname(ca.__file__)
+    files = [f for f in (os.path.join(folder, f'libuno.{end}') for end in ('so', 'dylib', 'dll')) if os.path.exists(f)]
+    if not files:
+        raise OSError(f"no libuno in {folder}")
+    uno = ctypes.CDLL(files[0])
+    uno.uno_create_solver.restype = ctypes.c_void_p
+    uno.uno_get_solver_option_type.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
+    return uno, uno.uno_create_solver()

@@ -1,0 +1,16 @@
+"""Subproblems of an MPCC, each built from its compiled functions.
+
+Read in this order: ``active_set`` (which side of a pair is zero), ``side_constraints`` (sides that need a row), ``relaxation``
+(Reg(eps) in all its forms), ``branch`` (the NLP with one side of each pair at zero), ``restoration`` (the least violation),
+``lpec`` (the linearised MPCC) with ``linear_program`` (HiGHS) and ``descent`` (a measure free of units), ``stationarity`` (the
+certificate), ``solver_cache`` (NLP solvers kept for later runs).  A new relaxation is a function in ``relaxation.FORMS``.
+"""
+
+from pyomo_fesd.mpcc.subproblems.active_set import FREE, G_ZERO, H_ZERO, ActiveSets, active_sets
+from pyomo_fesd.mpcc.subproblems.branch import Branch
+from pyomo_fesd.mpcc.subproblems.lpec import Lpec
+from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS
+from pyomo_fesd.mpcc.subproblems.restoration import Restoration
+from pyomo_fesd.mpcc.subproblems.side_constraints import settle, sort_sides
+from pyomo_fesd.mpcc.subproblems.solver_cache import SolverCache
+from pyomo_fesd.mpcc.subproblems.stationarity import Certificate, Stationarity, certify_point, measure

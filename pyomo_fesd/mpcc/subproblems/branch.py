@@ -1,0 +1,139 @@
+"""Branch NLP: one side of every pair fixed to zero (theory, section 4).
+
+Its solution is exactly complementary, whatever the eps of the relaxation before.  Decided pairs (eq. 13) are imposed as equations
+where their eta is positive.
+
+Takes: a compiled MPCC and an assignment.
+Leaves: an NLP built once; an assignment only changes bounds.
+Does not apply: where the bounds of an assignment contradict each other; ``solve`` then returns None.
+"""
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from pyomo_fesd.mpcc.compile import Outer, composed, csr_pattern, take
+from pyomo_fesd.mpcc.subproblems.linear_program import Program, infeasible
+from pyomo_fesd.mpcc.subproblems.side_constraints import settle
+
+#: A branch starts near its solution: not so close to the bounds that Ipopt's steps are cut short, nor pushed far from them.
+NEAR = {
+    'mu_strategy': 'monotone',
+    'mu_init': 1e-4,
+    'bound_push': 1e-4,
+    'bound_frac': 1e-4,
+    'constr_viol_tol': 1e-11,
+    'compl_inf_tol': 1e-10,
+}
+#: A row without free variables, or one of more equations than free variables, may miss its bounds by this much.
+ROW_TOLERANCE = 1e-9
+
+
+class Branch:
+    """All branch NLPs of one MPCC.
+
+    Parameters
+    ----------
+    c : MpccFunctions
+    sides : Sides
+    make : callable
+        makes an ``NlpSolver`` from a name, x, p, f, g and perhaps a budget and derivatives
+    """
+
+    def __init__(self, c, sides, make):
+        self._c, self._sides = c, sides
+        weight, z = ca.SX.sym('weight'), ca.SX.sym('z', c.derivatives.z.shape[0])
+        rows = take(z, [*sides.chosen, *range(2 * c.G.numel(), z.numel())])
+        nlp = composed(c, weight, Outer(z, ca.SX(0, 1), ca.SX(0), rows))
+        self._pattern = csr_pattern(nlp.derivatives.jacobian)
+        self._values = ca.Function('rows', [c.x, c.p], [nlp.g])
+        self._nlp = make('branch', nlp.x, ca.vertcat(weight, c.p), nlp.f, nlp.g, NEAR, nlp.derivatives)
+
+    def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None):
+        """Solve the branch ``zero`` from ``w``.
+
+        Parameters
+        ----------
+        zero : int array (q)
+            ``G_ZERO`` or ``H_ZERO`` for each pair, first settled
+        equal : bool array (decisions) or None
+            decisions to impose
+        weight : float
+            1 to keep the penalty terms in the objective, 0 to leave them out
+        box : (array, array), optional
+            a trust region: bounds of w besides its own
+        duals : NlpResult, optional
+            a relaxation's or branch's result whose multipliers to start from
+        max_iter : int, optional
+
+        Returns
+        -------
+        NlpResult, or None if the assignment contradicts the bounds
+        """
+        c = self._c
+        zero = settle(c, self._sides, w, zero)
+        bounds = self._bounds(zero)
+        if bounds is None:
+            return None
+        lbx, ubx = bounds
+        lbg, ubg = self._row_bounds(zero, equal)
+        w = np.clip(w, lbx, ubx)
+        if not self._drop_settled_rows(w, lbx == ubx, lbg, ubg):
+            return None
+        self._widen_surplus_equations(lbx == ubx, lbg, ubg)
+        if box is not None:
+            free = lbx < ubx
+            lbx, ubx = np.where(free, np.maximum(lbx, box[0]), lbx), np.where(free, np.minimum(ubx, box[1]), ubx)
+        return self._nlp.solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, self._start(duals), max_iter)
+
+    def infeasible(self, zero) -> bool:
+        """Whether a linear program shows that the branch ``zero``, in which pairs may be FREE, has no point."""
+        c = self._c
+        if not c.linear:
+            return False
+        at, (_, J_g, J_G, J_H, _), w = c.evaluate(c.x0), c.gradients(c.x0), c.x0
+        A, here = sparse.vstack([J_g, J_G, J_H]).tocsr(), np.concatenate([at.g, at.G, at.H])
+        constant, sides = here - A @ w, np.zeros(2 * len(zero))
+        high = np.concatenate([c.ubg, np.where(self._sides.zero_rows(zero), 0.0, np.inf)]) - constant
+        low = np.concatenate([c.lbg, sides]) - constant
+        return infeasible(Program(np.zeros(len(w)), A, low, high, c.lbx, c.ubx, np.maximum(1.0, np.abs(w))))
+
+    def _start(self, duals):
+        """Multipliers of a relaxation for the rows that a branch shares with it, zero for the others."""
+        if duals is None:
+            return None
+        rows, shared = len(self._c.lbg) + len(self._sides.chosen), np.zeros(self._pattern.shape[0])
+        shared[:rows] = duals.lam_g[:rows]
+        return duals.with_multipliers(duals.lam_x[: len(self._c.x0)], shared)
+
+    def _bounds(self, zero):
+        lbx, ubx = self._sides.bounds(zero, self._c.lbx, self._c.ubx)
+        return None if np.any(lbx > ubx) else (lbx, ubx)
+
+    def _row_bounds(self, zero, equal):
+        c, sides = self._c, self._sides
+        own = sides.row_of >= 0
+        upper = np.full(len(sides.chosen), np.inf)
+        upper[sides.row_of[own & sides.zero_rows(zero)]] = 0.0
+        equal = np.zeros(c.equal.numel(), dtype=bool) if equal is None else equal
+        free = np.where(equal, 0.0, np.inf)
+        lbg = np.concatenate([c.lbg, np.zeros(len(upper)), -free])
+        return lbg, np.concatenate([c.ubg, upper, free])
+
+    def _drop_settled_rows(self, w, fixed, lbg, ubg):
+        """Free the rows whose variables are all fixed; returns False if one of them is violated."""
+        settled = (self._pattern @ (~fixed).astype(float)) == 0
+        if settled.any():
+            g = np.asarray(self._values(w, self._c.parameters), dtype=float).ravel()[settled]
+            if np.any(g < lbg[settled] - ROW_TOLERANCE) or np.any(g > ubg[settled] + ROW_TOLERANCE):
+                return False
+            lbg[settled], ubg[settled] = -np.inf, np.inf
+        return True
+
+    @staticmethod
+    def _widen_surplus_equations(fixed, lbg, ubg):
+        """Turn equations into narrow ranges if they outnumber the free variables; Ipopt refuses that many equations."""
+        equations = lbg == ubg
+        if np.count_nonzero(equations) > np.count_nonzero(~fixed):
+            lbg[equations] -= ROW_TOLERANCE
+            ubg[equations] += ROW_TOLERANCE

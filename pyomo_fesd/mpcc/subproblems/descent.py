@@ -1,0 +1,86 @@
+"""How much a linear program descends, by a measure that no unit and no offset of the objective changes.
+
+For every y:  cost' d = (cost - A' y)' d + y' A d.  Over the box and the rows' bounds each term is bounded on its own, so the sum of
+these bounds is a lower bound of the program's value, whoever gave y; with the multipliers of a solution it is the value itself.
+
+A term counts relative to the terms that cancel in it.  For column j these are
+
+    N_j = reach_j (|cost_j| + sum_i |A_ij y_i| + sum_k |d2L/dw_j dw_k| reach_k)
+
+that is, what the reduced cost would be without the cancellation, and how it changes where w does: descent_j / N_j below 1e-6 means
+that a point within 1e-6 reach has no descent there.  Neither factors of f, w and rows nor an offset of f change this ratio.  Terms
+below FLOOR times the largest N of the objective alone are round-off of the NLP solver.
+"""
+
+import numpy as np
+
+#: Terms below this part of the objective's largest gradient entry (or change of it) over the reach are round-off.
+FLOOR = 1e-8
+#: Smaller sizes are zero.
+SMALLEST = 1e-200
+
+
+class Descent:
+    """Measures the descent of one program.
+
+    Parameters
+    ----------
+    program : Program
+        without binaries
+    changes : callable -> list of (array (n), csr (m, n))
+        changes of cost and A, each along a displacement by the reach of every variable
+    """
+
+    def __init__(self, program, changes):
+        self._p, self._changes, self._known = program, changes, None
+
+    def of(self, program):
+        """The same for a program that differs in its bounds only."""
+        other = Descent(program, self._changes)
+        other._known = self._known
+        return other
+
+    def proved(self, y) -> float:
+        """The largest relative descent that multipliers ``y`` (rows, positive at ``low``) leave possible."""
+        p = self._p
+        y = np.where(np.isneginf(p.low), np.minimum(y, 0.0), y)
+        y = np.where(np.isposinf(p.high), np.maximum(y, 0.0), y)
+        products = p.A.multiply(y[:, None]).tocsr()
+        columns = -_least(p.cost - p.A.T @ y, p.lower, p.upper)
+        rows = -_least(y, p.low, p.high)
+        size = (np.abs(p.cost) + np.asarray(abs(products).sum(axis=0)).ravel() + self._curvature(y)) * p.reach
+        floor = FLOOR * self._reach_of_objective()
+        by_columns = _ratios(columns, size, floor)
+        # a row's term is y_i times its slack: as large as its part in a column, and relative to what the row can move
+        part = abs(products).multiply(p.reach).multiply(1.0 / np.where(size > SMALLEST, size, 1.0)).tocsr()
+        of_rows = part.max(axis=1).toarray().ravel() if part.shape[0] else np.zeros(0)
+        extent = np.abs(y) * (abs(p.A) @ p.reach)
+        by_rows = _ratios(rows, extent, floor) * np.minimum(of_rows, 1.0)
+        return float(max(by_columns.max(initial=0.0), by_rows.max(initial=0.0)))
+
+    def negligible(self, value) -> bool:
+        """Whether a value of the program is round-off."""
+        return -value <= FLOOR * self._reach_of_objective()
+
+    def _curvature(self, y):
+        along = [np.abs(cost - A.T @ y) for cost, A in self._known_changes()]
+        return np.max(along, axis=0) if along else 0.0
+
+    def _reach_of_objective(self):
+        sizes = [np.abs(self._p.cost), *(np.abs(cost) for cost, _ in self._known_changes())]
+        return float(np.max(np.max(sizes, axis=0) * self._p.reach, initial=0.0))
+
+    def _known_changes(self):
+        if self._known is None:
+            self._known = self._changes()
+        return self._known
+
+
+def _ratios(terms, sizes, floor):
+    return np.where(terms > floor, terms / np.where(sizes > 0, sizes, 1.0), 0.0)
+
+
+def _least(factor, low, high):
+    """The least factor * v over low <= v <= high, elementwise, never positive as 0 is among them."""
+    at = np.where(factor > 0, low, high)
+    return np.minimum(np.where(factor == 0, 0.0, factor * np.where(factor == 0, 0.0, at)), 0.0)

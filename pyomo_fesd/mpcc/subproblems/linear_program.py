@@ -1,0 +1,178 @@
+"""Linear programs with binaries in HiGHS: equilibrated before, and the answer checked afterwards.
+
+    min cost' d   s.t.  low <= A d <= high,  lower <= d <= upper,   the last ``binaries`` variables in {0, 1}
+
+Takes: a program whose columns have a known reach.
+Leaves: a point, the rows' multipliers where there are no binaries, and HiGHS' bound; None where HiGHS' own answer does not hold.
+"""
+
+from dataclasses import dataclass
+
+import highspy
+import numpy as np
+
+#: HiGHS' own 1e-7 is too coarse.  With such tolerances its presolve calls some LPECs infeasible although d = 0 is feasible, and
+#: d = 0 optimal in others that have descent, so it stays off.
+ATTEMPTS = (
+    {'presolve': 'off', 'tolerance': 1e-9},
+    {'presolve': 'off', 'tolerance': 1e-8, 'solver': 'ipm'},
+    {'presolve': 'off', 'tolerance': 1e-7},
+)
+TOLERANCES = ('primal_feasibility_tolerance', 'dual_feasibility_tolerance', 'mip_feasibility_tolerance')
+#: The equilibrated cost has entries up to 1; the defaults (1e-6 and 1e-4) would call d = 0 optimal beside a small descent.
+GAPS = {'mip_abs_gap': 1e-9, 'mip_rel_gap': 1e-6}
+ENDED_WELL = (highspy.HighsModelStatus.kOptimal, highspy.HighsModelStatus.kObjectiveTarget)
+LIMITED = (highspy.HighsModelStatus.kSolutionLimit, highspy.HighsModelStatus.kIterationLimit, highspy.HighsModelStatus.kTimeLimit)
+#: Branch and bound ends at a direction with this descent, where the largest entry of the cost descends by 1.
+CLEAR_DESCENT = 1e-3
+#: A point of HiGHS may miss equilibrated rows by this, and its value the bound by this.
+RESIDUAL, GAP = 1e-6, 1e-6
+#: Smaller entries, in rows whose columns reach 1, are noise; HiGHS drops them too.
+NOISE = 1e-9
+
+
+@dataclass(frozen=True)
+class Program:
+    """min cost' d, low <= A d <= high, lower <= d <= upper; ``reach`` is the size of each column."""
+
+    cost: np.ndarray
+    A: object
+    low: np.ndarray
+    high: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    reach: np.ndarray
+    binaries: int = 0
+
+    def equilibrated(self):
+        """The same program in d / reach, with rows and cost scaled to a largest entry of 1; and the factors of rows and cost."""
+        with np.errstate(over='ignore', invalid='ignore'):
+            A, cost = self.A.tocsc(copy=True), self.cost * self.reach
+        A.data *= np.repeat(self.reach, np.diff(A.indptr))
+        A.data[np.abs(A.data) < NOISE] = 0.0
+        A.eliminate_zeros()
+        largest = np.abs(A).max(axis=1).toarray().ravel() if A.shape[1] and A.shape[0] else np.zeros(A.shape[0])
+        rows, size = 1.0 / np.where(largest > 0, largest, 1.0), np.abs(cost).max(initial=0.0)
+        A.data *= rows[A.indices]
+        factor = 1.0 / size if size > 0 else 1.0
+        bounds = self.low * rows, self.high * rows, self.lower / self.reach, self.upper / self.reach
+        # a gradient may have overflown: HiGHS refuses what is no number
+        with np.errstate(invalid='ignore'):
+            return Program(cost * factor, A, *bounds, np.ones(len(cost)), self.binaries), rows, factor
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A point, the rows' multipliers (positive at lower bounds; None with binaries), and whether the search was cut short."""
+
+    d: np.ndarray
+    y: object
+    cut_short: bool
+
+
+def solve(program, options, deadline, start=None, clear=False, limits=None):
+    """The ``Answer`` of HiGHS, or None without one that holds.
+
+    Parameters
+    ----------
+    program : Program
+    options : dict
+        of the user
+    deadline : Deadline
+    start : array, optional
+    clear : bool
+        whether a clear descent may end branch and bound
+    limits : dict, optional
+        HiGHS options of a single attempt; when one of them ends the search, the best point so far is taken
+    """
+    p, rows, factor = program.equilibrated()
+    limits = limits or {}
+    for attempt in ATTEMPTS:
+        highs = highspy.Highs()
+        for name, option in _settings(attempt, p.binaries, clear, deadline, limits | options).items():
+            highs.setOptionValue(name, option)
+        highs.passModel(_highs_model(p))
+        if start is not None:
+            guess = highspy.HighsSolution()
+            guess.col_value = list(start / program.reach)
+            highs.setSolution(guess)
+        highs.run()
+        answer = _answer(highs, p, bool(limits))
+        if answer is not None:
+            y = None if answer.y is None else answer.y * rows / factor
+            return Answer(answer.d * program.reach, y, answer.cut_short)
+        if limits:
+            return None
+    return None
+
+
+def refusal(options: dict) -> str | None:
+    """Return HiGHS' answer if it refuses one of these options, else None."""
+    highs = highspy.Highs()
+    highs.setOptionValue('output_flag', False)
+    try:
+        refused = [name for name, option in options.items() if highs.setOptionValue(name, option) != highspy.HighsStatus.kOk]
+    except TypeError as error:
+        return str(error).splitlines()[0]
+    return "unknown option or value" if refused else None
+
+
+def infeasible(program) -> bool:
+    """Whether HiGHS shows that a program has no point."""
+    highs = highspy.Highs()
+    highs.setOptionValue('output_flag', False)
+    highs.passModel(_highs_model(program.equilibrated()[0]))
+    highs.run()
+    return highs.getModelStatus() == highspy.HighsModelStatus.kInfeasible
+
+
+def _answer(highs, p, limited):
+    """HiGHS' answer to the equilibrated program; None where it did not end or does not hold."""
+    status, solution = highs.getModelStatus(), highs.getSolution()
+    stopped = limited and status in LIMITED and solution.value_valid
+    if not (status in ENDED_WELL or stopped):
+        return None
+    d = np.array(solution.col_value)
+    optimal = p.binaries and status == highspy.HighsModelStatus.kOptimal
+    if not _holds(p, d) or (optimal and not _bounded(highs, p.cost @ d)):
+        return None
+    y = np.array(solution.row_dual) if not p.binaries and solution.dual_valid else None
+    return Answer(np.clip(d, p.lower, p.upper), y, stopped)
+
+
+def _holds(p, d):
+    """Whether a point satisfies rows and bounds."""
+    activity = p.A @ d
+    misses = (p.low - activity, activity - p.high, p.lower - d, d - p.upper)
+    return np.isfinite(d).all() and max(miss.max(initial=0.0) for miss in misses) <= RESIDUAL
+
+
+def _bounded(highs, value):
+    """Whether HiGHS has proved that nothing is much better than ``value``."""
+    return highs.getInfo().mip_dual_bound >= value - GAP * max(1.0, abs(value))
+
+
+def _settings(attempt, binaries, clear, deadline, given):
+    """HiGHS options of one attempt; those that are ``given`` override ours, except for the deadline."""
+    settings = {'output_flag': False} | {name: value for name, value in attempt.items() if name != 'tolerance'}
+    if binaries:
+        settings.pop('solver', None)
+        settings |= GAPS | ({'objective_target': -CLEAR_DESCENT} if clear else {})
+    settings |= dict.fromkeys(TOLERANCES, attempt['tolerance']) | given
+    if deadline.at is not None:
+        settings['time_limit'] = min(settings.get('time_limit', np.inf), deadline.left())
+    return settings
+
+
+def _highs_model(p):
+    """The program for HiGHS."""
+    lp = highspy.HighsLp()
+    lp.num_col_, lp.num_row_ = p.A.shape[1], p.A.shape[0]
+    lp.col_cost_, lp.col_lower_, lp.col_upper_ = p.cost, p.lower, p.upper
+    lp.row_lower_, lp.row_upper_ = p.low, p.high
+    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+    lp.a_matrix_.start_, lp.a_matrix_.index_, lp.a_matrix_.value_ = p.A.indptr, p.A.indices, p.A.data
+    if p.binaries:
+        kinds = [highspy.HighsVarType.kContinuous] * (p.A.shape[1] - p.binaries)
+        lp.integrality_ = kinds + [highspy.HighsVarType.kInteger] * p.binaries
+    return lp

@@ -1,0 +1,224 @@
+"""The reduced LPEC: the MPCC linearised at a point, binaries only for bi-active pairs (theory, eq. 17).
+
+    min  grad f' d
+    s.t. linearised rows and bounds,   |d_j| <= Delta max(1, |w_j|)
+         G_i + grad G_i' d  = 0  (alpha),   H_i + grad H_i' d  = 0  (beta),   the other side >= 0
+         0 <= G_i + grad G_i' d <= M_i^G y_i,   0 <= H_i + grad H_i' d <= M_i^H (1 - y_i),   y_i in {0, 1}  (gamma)
+
+with M_i from the row's 1-norm over the trust region, never a global big-M.  d = 0 is feasible by construction: a violation of the
+point is not to be corrected by d.
+
+With multipliers, weak duality comes first: if it shows that even without the binaries no direction descends, no branch has one, and
+HiGHS is not called.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from pyomo_fesd.mpcc.nlp import Deadline, check_options
+from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO
+from pyomo_fesd.mpcc.subproblems.descent import Descent
+from pyomo_fesd.mpcc.subproblems.linear_program import Program, refusal, solve
+from pyomo_fesd.mpcc.subproblems.side_constraints import release_followers, without_constant
+
+#: Displacements, relative to the variables' sizes, along which gradients are compared; so many, in random directions.
+DISPLACEMENT, DISPLACEMENTS, SEED = 1e-4, 2, 0
+
+
+@dataclass(frozen=True)
+class LpecResult:
+    """Outcome of one LPEC.
+
+    Attributes
+    ----------
+    solved : bool
+    value : float
+        grad f' d, never positive
+    d : array (n)
+    zero : int array (q)
+        the assignment that d follows
+    binaries : int
+    descent : float
+        the value relative to the terms of the gradient (see ``descent``): free of units and of the objective's offset
+    """
+
+    solved: bool
+    value: float
+    d: np.ndarray
+    zero: np.ndarray
+    binaries: int
+    descent: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Linearised:
+    """The LPEC at one point, without its binaries: the Program, its row blocks, and value and Jacobian of bi-active sides."""
+
+    program: Program
+    equal: np.ndarray
+    G: np.ndarray
+    H: np.ndarray
+    J_G: object
+    J_H: object
+
+
+class Lpec:
+    """Solves LPECs of one compiled MPCC.
+
+    Parameters
+    ----------
+    sides : Sides
+    options : dict
+        HiGHS options, passed through
+    deadline : Deadline, optional
+        at which HiGHS stops
+
+    Raises
+    ------
+    FesdError
+        naming an option that HiGHS refuses
+    """
+
+    def __init__(self, compiled, sides, options, deadline=None):
+        check_options('HiGHS', options, refusal, 'lpec_options')
+        self._c, self._sides, self._options, self._deadline = compiled, sides, options, deadline or Deadline()
+
+    def solve(self, w, sets, Delta, equal=None, beyond=False, multipliers=None, enough=None, limits=None) -> LpecResult:
+        """Solve the LPEC at ``w`` with active sets ``sets``, trust region ``Delta`` and the decisions ``equal`` imposed.
+
+        Parameters
+        ----------
+        beyond : bool
+            whether to ignore the bounds of variables with guide bounds, which belong to the method
+        multipliers : array, optional
+            of the branch's rows, positive at lower bounds, to try weak duality with
+        enough : float, optional
+            a relative descent below this does not count: weak duality may end the search, and a clear descent branch and bound
+        limits : dict, optional
+            HiGHS options of this call; when one of them ends the search, the best direction so far is taken
+        """
+        equal = np.zeros(self._c.equal.numel(), dtype=bool) if equal is None else equal
+        reach = Delta * _sizes(w)
+        sets = release_followers(sets, self._c.followers, self._c.evaluate(w))
+        lower, upper = self._box(w, sets, reach, beyond)
+        sets = without_constant(sets, self._sides, (lower == 0.0) & (upper == 0.0))
+        at = self._linearised(w, sets, equal, reach, lower, upper)
+        descent = Descent(at.program, lambda: self._changes(w, sets, equal))
+        if multipliers is not None and enough is not None:
+            left = descent.proved(self._row_multipliers(multipliers, sets, equal))
+            if left <= enough:
+                return LpecResult(True, 0.0, np.zeros(len(w)), sets.zero, 0)
+        found, cut_short = self._mixed_integer(sets, at, enough is not None, limits or {})
+        if not found.solved or cut_short or descent.negligible(found.value):
+            return found
+        return self._within_branch(at, sets, found, descent)
+
+    def _linearised(self, w, sets, equal, reach, lower, upper):
+        c = self._c
+        at, gradients = c.evaluate(w), c.gradients(w)
+        _, _, J_G, J_H, _ = gradients
+        G, H = np.maximum(at.G, 0.0), np.maximum(at.H, 0.0)
+        alpha, beta, gamma, free = sets.alpha, sets.beta, sets.gamma, sets.open
+        low = [np.minimum(c.lbg - at.g, 0.0), 0.0, -H[alpha], 0.0, -G[beta], 0.0, -G[free], -H[free], -G[gamma], -H[gamma]]
+        high = [np.maximum(c.ubg - at.g, 0.0), 0.0, np.inf, 0.0, np.inf, 0.0, np.inf, np.inf, np.inf, np.inf]
+        blocks = _blocks(gradients, sets, equal)
+        low, high = (np.concatenate([np.broadcast_to(v, J.shape[0]) for v, J in zip(by, blocks)]) for by in (low, high))
+        program = Program(gradients[0], sparse.vstack(blocks).tocsr(), low, high, lower, upper, reach)
+        return _Linearised(program, equal, G[gamma], H[gamma], J_G[gamma], J_H[gamma])
+
+    def _changes(self, w, sets, equal):
+        """Changes of the gradient and of the rows along displacements of all variables by their sizes, within their bounds."""
+        random, sizes = np.random.default_rng(SEED), _sizes(w)
+        here, changes = self._c.gradients(w), []
+        for _ in range(DISPLACEMENTS):
+            step = DISPLACEMENT * sizes * random.choice((-1.0, 1.0), size=len(w))
+            within = [(w + s >= self._c.lbx) & (w + s <= self._c.ubx) for s in (step, -step)]
+            step = np.where(within[0], step, np.where(within[1], -step, 0.0))
+            there = self._c.gradients(w + step)
+            cost = np.nan_to_num((there[0] - here[0]) / DISPLACEMENT, posinf=0.0, neginf=0.0)
+            A = sparse.vstack([b - a for a, b in zip(_blocks(here, sets, equal), _blocks(there, sets, equal))]).tocsr()
+            A.data = np.nan_to_num(A.data / DISPLACEMENT, posinf=0.0, neginf=0.0)
+            changes.append((cost, A))
+        return changes
+
+    def _box(self, w, sets, reach, beyond):
+        """Bounds of d: the trust region; 0 for the variables of a side that is zero because they are at their bounds."""
+        c = self._c
+        free = c.guided & beyond
+        lbx, ubx = np.where(free, -np.inf, c.lbx), np.where(free, np.inf, c.ubx)
+        lower, upper = np.minimum(np.maximum(-reach, lbx - w), 0.0), np.maximum(np.minimum(reach, ubx - w), 0.0)
+        settled = np.concatenate([sets.alpha, sets.beta]) & (self._sides.row_of < 0)
+        still = self._sides.fixings[np.flatnonzero(settled)].indices
+        lower[still] = upper[still] = 0.0
+        return lower, upper
+
+    def _row_multipliers(self, lam, sets, equal):
+        """Multipliers of a branch's rows (own, sides, decisions) in the order of the program's rows."""
+        m, q, row_of = len(self._c.lbg), len(sets.zero), self._sides.row_of
+        of_side = np.zeros(2 * q)
+        of_side[row_of >= 0] = lam[m + row_of[row_of >= 0]]
+        G, H = of_side[:q], of_side[q:]
+        decided = lam[len(lam) - len(equal) :]
+        sides = [G[sets.alpha], H[sets.alpha], H[sets.beta], G[sets.beta]]
+        undecided = [G[sets.open], H[sets.open], G[sets.gamma], H[sets.gamma]]
+        return np.concatenate([lam[:m], *sides, decided[equal], *undecided])
+
+    def _mixed_integer(self, sets, at, clear, limits):
+        """With a binary for each bi-active pair: G + grad G d - M y <= 0  and  H + grad H d + M y <= M."""
+        p, n, y = at.program, len(at.program.cost), int(sets.gamma.sum())
+        A, high = p.A, p.high
+        if y:
+            M_G, M_H = _big_m(at.J_G, at.G, p.lower, p.upper), _big_m(at.J_H, at.H, p.lower, p.upper)
+            either = sparse.bmat([[at.J_G, -sparse.diags(M_G)], [at.J_H, sparse.diags(M_H)]])
+            A = sparse.vstack([sparse.hstack([A, sparse.csr_matrix((A.shape[0], y))]), either])
+            high = np.concatenate([high, -at.G, M_H - at.H])
+        program = Program(
+            np.concatenate([p.cost, np.zeros(y)]),
+            A,
+            np.concatenate([p.low, np.full(2 * y, -np.inf)]),
+            high,
+            np.concatenate([p.lower, np.zeros(y)]),
+            np.concatenate([p.upper, np.ones(y)]),
+            np.concatenate([p.reach, np.ones(y)]),
+            y,
+        )
+        start = np.concatenate([np.zeros(n), (sets.zero[sets.gamma] == H_ZERO).astype(float)])
+        answer = solve(program, self._options, self._deadline, start, clear, limits)
+        zero = sets.zero.copy()
+        if answer is None:
+            return LpecResult(False, 0.0, np.zeros(n), zero, y), True
+        zero[sets.gamma] = np.where(answer.d[n:] > 0.5, H_ZERO, G_ZERO)
+        return LpecResult(True, min(float(p.cost @ answer.d[:n]), 0.0), answer.d[:n], zero, y), answer.cut_short
+
+    def _within_branch(self, at, sets, found, descent):
+        """``found`` with the best direction of its branch and its relative descent, which the multipliers of this LP show."""
+        p, chosen, y = at.program, found.zero[sets.gamma], int(sets.gamma.sum())
+        high = p.high.copy()
+        high[len(high) - 2 * y :] = np.where(np.concatenate([chosen == G_ZERO, chosen == H_ZERO]), 0.0, np.inf)
+        branch = replace(p, high=high)
+        answer = solve(branch, self._options, self._deadline)
+        if answer is None or answer.y is None:
+            return replace(found, descent=-found.value / float(np.abs(p.cost) @ p.reach))
+        value = min(float(p.cost @ answer.d), 0.0)
+        measured = descent.of(branch).proved(answer.y)
+        return replace(found, value=value, d=answer.d, descent=measured)
+
+
+def _sizes(w):
+    """The size of each variable at ``w``."""
+    return np.maximum(1.0, np.abs(w))
+
+
+def _blocks(gradients, sets, equal):
+    """The program's rows: own, pairs with G = 0, with H = 0, decisions, open pairs, bi-active pairs."""
+    _, J_g, J_G, J_H, J_equal = gradients
+    sides = [J_G[sets.alpha], J_H[sets.alpha], J_H[sets.beta], J_G[sets.beta]]
+    return [J_g, *sides, J_equal[equal], J_G[sets.open], J_H[sets.open], J_G[sets.gamma], J_H[sets.gamma]]
+
+
+def _big_m(J, side, d_low, d_high):
+    """The largest value that each side can take in the box."""
+    positive, negative = J.maximum(0), J.minimum(0)
+    return side + positive @ d_high + negative @ d_low

@@ -1,0 +1,157 @@
+"""Sort the sides of all pairs into those that bounds keep non-negative and those that need a row.
+
+A linear side whose least value over the variables' bounds is 0 needs no row: the bounds keep it non-negative, and it is zero
+exactly when each of its variables is at the bound that gives the least value.  So a branch fixes variables instead of adding
+equations ("a sum of non-negative variables is 0"), and Ipopt gets no superfluous equations.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from pyomo_fesd.mpcc.subproblems.active_set import FREE, G_ZERO, H_ZERO
+
+#: Agreement of a side's least value with 0.
+EXACT = 1e-12
+#: A constant side is zero below this.
+SETTLED = 1e-9
+#: A follower does not agree with its leader if the side that should be zero is above this.
+OPEN = 1e-3
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Sides G (first q) and H (last q) of a compiled MPCC, index k = side * q + pair.
+
+    Attributes
+    ----------
+    chosen : int array
+        sides that need a row of their own, each once
+    row_of : int array (2q)
+        position of a side among these rows, -1 where bounds do
+    fixings : csr (2q, n)
+        bound at which a side without a row is zero: 1 the variable's lower, 2 its upper
+    """
+
+    chosen: np.ndarray
+    row_of: np.ndarray
+    fixings: object
+
+    def zero_rows(self, zero):
+        """Mask over the sides (2q) that an assignment sets to zero."""
+        return np.concatenate([zero == G_ZERO, zero == H_ZERO])
+
+    def constant(self, fixed):
+        """Mask over the sides (2q) whose variables are all among the ``fixed`` (mask over the n variables)."""
+        return self._pattern @ (~fixed).astype(float) == 0
+
+    @cached_property
+    def _pattern(self):
+        """Ones where a side contains a variable."""
+        pattern = self.fixings.copy()
+        pattern.data = np.ones_like(pattern.data)
+        return pattern
+
+    def bounds(self, zero, lbx, ubx):
+        """Bounds of the variables (from ``lbx`` and ``ubx``) in the branch of an assignment; they may contradict each other."""
+        fixed = self.fixings[np.flatnonzero(self.zero_rows(zero) & (self.row_of < 0))]
+        lower, upper = np.unique(fixed.indices[fixed.data == 1]), np.unique(fixed.indices[fixed.data == 2])
+        low, high = lbx.copy(), ubx.copy()
+        high[lower] = lbx[lower]
+        low[upper] = ubx[upper]
+        return low, high
+
+    def same_rows(self, other):
+        """Whether the same sides have rows, and the others the same bounds."""
+        if not np.array_equal(self.row_of, other.row_of):
+            return False
+        without = np.flatnonzero(self.row_of < 0)
+        return (self.fixings[without] != other.fixings[without]).nnz == 0
+
+
+def sort_sides(c) -> Sides:
+    """Sort the sides of a compiled MPCC."""
+    S = ca.vertcat(c.G, c.H)
+    if S.numel() == 0:
+        return Sides(np.zeros(0, dtype=int), np.zeros(0, dtype=int), sparse.csr_matrix((0, len(c.x0))))
+    nonlinear = np.array(ca.which_depends(S, c.x, 2, True))
+    _, _, J_G, J_H, _ = c.gradients(c.x0)
+    at = c.evaluate(c.x0)
+    A = sparse.vstack([J_G, J_H]).tocsr()
+    constant = np.concatenate([at.G, at.H]) - A @ c.x0
+    direction, least = _least(A, c.lbx, c.ubx)
+    fixable = ~nonlinear & (np.abs(least + constant) <= EXACT)
+    row_of = np.full(S.numel(), -1)
+    needed = np.flatnonzero(~fixable)
+    _, first, row = np.unique(c.side_of[needed], return_index=True, return_inverse=True)
+    row_of[needed] = row
+    return Sides(needed[first], row_of, direction)
+
+
+def settle(c, sides, w, zero):
+    """The assignment ``zero`` without sides that other pairs decide.
+
+    Followers get the sides of their leaders.  The bounds that a branch fixes may make a side constant.  If that is zero, its pair
+    holds, and a row for the other side would only take away room.  (Both sides of such a pair are zero at many solutions, and
+    round-off would choose.)
+
+    Parameters
+    ----------
+    c : MpccFunctions
+    w : array
+        values of the variables that the assignment does not fix
+    zero : int array (q)
+    """
+    zero = _follow(c.followers, zero)
+    lbx, ubx = sides.bounds(zero, c.lbx, c.ubx)
+    constant = sides.constant(lbx == ubx)
+    needs_row = sides.zero_rows(zero) & (sides.row_of >= 0)
+    if np.any(lbx > ubx) or not np.any(constant) or not np.any(needs_row):
+        return zero
+    at = c.evaluate(np.clip(w, lbx, ubx))
+    small = np.abs(np.concatenate([at.G, at.H])) <= SETTLED
+    other = np.roll(constant & small, len(zero))
+    changes = np.any((needs_row & ~constant & other).reshape(2, -1), axis=0)
+    return np.where(changes, 1 - zero, zero)
+
+
+def _follow(followers, zero):
+    """The assignment in which followers have the sides of their leaders."""
+    new = zero.copy()
+    new[followers.pairs] = _led(followers, zero)
+    return new
+
+
+def _led(followers, zero):
+    """The side that each follower gets; FREE where its leader is."""
+    leading = zero[followers.leaders]
+    return np.where(followers.swapped & (leading != FREE), 1 - leading, leading)
+
+
+def release_followers(sets, followers, at):
+    """Active sets in which followers that do not agree with their leaders are open: nothing keeps them from following."""
+    zero, gamma, k = sets.zero.copy(), sets.gamma.copy(), followers.pairs
+    wrong = np.where(_led(followers, zero) == G_ZERO, at.G[k], at.H[k]) > OPEN
+    wrong &= ~gamma[followers.leaders]
+    zero[k[wrong]], gamma[k[wrong]] = FREE, False
+    return replace(sets, zero=zero, gamma=gamma)
+
+
+def without_constant(sets, sides, fixed):
+    """Active sets without bi-active pairs that hold by a side whose variables are all ``fixed``: they need no binary."""
+    G, H = sides.constant(fixed).reshape(2, -1) & sets.gamma
+    zero = np.where(G, G_ZERO, np.where(H, H_ZERO, sets.zero))
+    return replace(sets, zero=zero, gamma=sets.gamma & ~(G | H))
+
+
+def _least(A, lower, upper):
+    """Which bound each variable takes where A w is least (csr of 1: lower, 2: upper), and that least value."""
+    bound = np.where(A.data > 0, lower[A.indices], upper[A.indices])
+    product = A.data * np.where(A.data == 0, 0.0, bound)
+    least = np.zeros(A.shape[0])
+    np.add.at(least, np.repeat(np.arange(A.shape[0]), np.diff(A.indptr)), product)
+    direction = sparse.csr_matrix((np.where(A.data > 0, 1.0, 2.0), A.indices, A.indptr), shape=A.shape)
+    return direction, least

@@ -1,0 +1,85 @@
+"""Start values on a finer grid, from the solution on a coarser one.
+
+Every piece of the old solution gets elements of equal length, at least one, so that its switches are element boundaries again and
+the values identify the branch of the old solution.  Between the boundaries the values are those of the collocation polynomials.
+
+Takes: a model on its new grid, and the ``RoundSolution``.
+Leaves: values of all variables over time, of the element lengths, and of variables without time.
+Does not apply: to variables at element boundaries only (modes with hysteresis, jumps); there a simulation with the old controls is
+the start, if it succeeds.
+"""
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+from pyomo.core import Block, Var
+from pyomo.dae import ContinuousSet
+
+from pyomo_fesd.core import FesdError, TimeIndex, moving_grids
+from pyomo_fesd.refinement.dense_output import RoundSolution
+from pyomo_fesd.simulation import simulate
+
+
+def start_from(model: Block, wrt: ContinuousSet, solution: RoundSolution) -> None:
+    """Set the values of ``model`` to those of ``solution``."""
+    moving = moving_grids(model)[wrt]
+    grid = moving.grid
+    over_time = _variables_over_time(model, wrt, solution)
+    for v, was in solution.constants.items():
+        _set_within_bounds(v, was)
+    for name, found in over_time.items():
+        if wrt.first() in found:
+            _set_within_bounds(found[wrt.first()], solution.values[name][wrt.first()])
+    for element, piece, begin, end in _placed(grid, solution):
+        _set_length(moving.r[element.n], grid, element, solution, end - begin)
+        times = begin + (end - begin) * np.array([*grid.tau, 1.0][: len(element.own_labels)])
+        for name, found in over_time.items():
+            _set_all(found, element.own_labels, solution.inside(name, piece, times))
+    if moving.hysteresis is not None or moving.state_jumps is not None:
+        # after an error, the values up to there are a start too
+        with suppress(FesdError):
+            simulate(model, wrt)
+
+
+def _variables_over_time(model, wrt, solution):
+    free = (v for v in model.component_data_objects(Var, descend_into=Block) if not v.fixed)
+    return {name: found for name, found in TimeIndex(wrt).families(free).items() if name in solution.values}
+
+
+def _set_length(multiplier, grid, element, solution, h):
+    """Set the length multiplier of an element to the length h on physical time."""
+    total = sum(p.length for p in solution.pieces if p.stage == element.stage)
+    nominal = sum(e.length for e in grid.stages[element.stage])
+    if not multiplier.fixed:
+        multiplier.set_value(h / total * nominal / element.length, skip_validation=True)
+
+
+def _set_all(variables, labels, numbers):
+    for label, number in zip(labels, numbers):
+        if label in variables:
+            _set_within_bounds(variables[label], number)
+
+
+def _set_within_bounds(v, number):
+    """Set a value within the bounds, unless it is None or nan."""
+    if number is not None and not np.isnan(number):
+        v.set_value(float(np.clip(number, v.lb, v.ub)) if v.has_lb() or v.has_ub() else float(number), skip_validation=True)
+
+
+def _placed(grid, solution) -> Iterator[tuple]:
+    """``(element, piece, begin, end)`` of all elements of the new grid, on physical time."""
+    for stage, elements in grid.stages.items():
+        pieces, waiting = [p for p in solution.pieces if p.stage == stage], iter(elements)
+        for piece, number in zip(pieces, _numbers([p.length for p in pieces], len(elements))):
+            nodes = np.linspace(piece.nodes[0], piece.nodes[-1], number + 1)
+            for begin, end in zip(nodes, nodes[1:]):
+                yield next(waiting), piece, begin, end
+
+
+def _numbers(lengths, total):
+    """Numbers of elements with the sum ``total``, at least one for each length, that make the longest element shortest."""
+    found = [1] * len(lengths)
+    for _ in range(total - len(lengths)):
+        found[int(np.argmax(np.divide(lengths, found)))] += 1
+    return found

@@ -1,0 +1,78 @@
+"""Discretise and solve one round: by simulation without an objective, by ``mpec_hybrid`` with one."""
+
+from pyomo.core import Block, TransformationFactory
+from pyomo.dae import ContinuousSet
+from pyomo.opt import SolverFactory, TerminationCondition
+
+from pyomo_fesd.core import FesdError, moving_grids
+from pyomo_fesd.mpcc import Deadline
+from pyomo_fesd.refinement.checks import degree_of_freedom, objectives
+from pyomo_fesd.refinement.dense_output import RoundSolution
+from pyomo_fesd.refinement.interpolated_start import start_from
+from pyomo_fesd.simulation import simulate
+
+#: Ipopt iterations of a round that a finer one follows: on a grid that is too coarse, searches for a feasible point do not end.
+IMPATIENT = 5000
+
+
+class RoundSolver:
+    """Discretises with the ``keywords`` of ``fesd.finite_elements`` and solves with the ``options`` of ``mpec_hybrid``.
+
+    Attributes
+    ----------
+    ncp, order : int
+        collocation points in each element; order of the scheme
+    optimise : bool
+        whether there is an objective
+    deadline : Deadline
+        of all rounds
+    patient : bool
+        whether a round may use all iterations that the options allow: no finer one follows
+    results : SolverResults or None
+        of the last optimisation
+    """
+
+    def __init__(self, model: Block, wrt: ContinuousSet, keywords: dict, options: dict):
+        self._model, self._wrt, self._keywords, self._options = model, wrt, keywords, dict(options)
+        self.deadline = Deadline.after(self._options.pop('time_limit', self._options.pop('timelimit', None)))
+        self.ncp = keywords['ncp']
+        self.order = 2 * self.ncp - (keywords['scheme'] == 'LAGRANGE-RADAU')
+        self.optimise = any(True for _ in objectives(model))
+        self.results, self.patient = None, False
+
+    def solve(self, numbers: list[int], before: RoundSolution | None) -> FesdError | None:
+        """Solve with these numbers of elements, starting from ``before``; returns the error if there is no solution, else None."""
+        self.discretise(numbers)
+        return self._optimise(numbers, before) if self.optimise else self._simulate()
+
+    def discretise(self, numbers: list[int]) -> None:
+        """Put these numbers of elements on the control stages."""
+        TransformationFactory('fesd.finite_elements').apply_to(self._model, wrt=self._wrt, nfe=numbers, **self._keywords)
+
+    def _simulate(self):
+        held = moving_grids(self._model)[self._wrt].held
+        if len(held):
+            raise degree_of_freedom(held[1].body.args[0])
+        try:
+            simulate(self._model, self._wrt, time_limit=self.deadline.left(), **self._options)
+        except FesdError as error:
+            if error.component != self._wrt.name:
+                raise
+            # the simulation cannot go on: more elements may help
+            return error
+        return None
+
+    def _optimise(self, numbers, before):
+        if before is not None:
+            start_from(self._model, self._wrt, before)
+        options = {'warm_start': before is not None, 'timelimit': self.deadline.left()}
+        if not self.patient:
+            options['max_iterations'] = IMPATIENT
+        options |= self._options
+        self.results = SolverFactory('mpec_hybrid').solve(self._model, **options)
+        if self.results.solver.termination_condition == TerminationCondition.userInterrupt:
+            raise KeyboardInterrupt
+        if str(self.results.solver.stationarity) == 'B':
+            return None
+        cause = f"refine: no certified solution with nfe={numbers}: {self.results.solver.reason}"
+        return FesdError(self._wrt, cause, "give another start, or more elements in the first round (nfe)")

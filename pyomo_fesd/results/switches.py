@@ -1,0 +1,78 @@
+"""Switches on physical time: changes of the active set, and state jumps."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from pyomo.core import Block, value
+from pyomo.dae import ContinuousSet
+
+from pyomo_fesd.core import Element, TimeIndex, find_continuous_set, strip_time
+from pyomo_fesd.results.complementarity_modes import complementarity_modes, positive_modes
+from pyomo_fesd.results.disjunction_modes import disjunction_modes, surface_sides
+from pyomo_fesd.results.physical_time import elements, physical_time
+from pyomo_fesd.results.trajectory import jumps_that_happen
+
+
+class Switch(NamedTuple):
+    """One change of mode at physical ``time`` (units of the ContinuousSet); a sliding mode reads ``sliding a | b``."""
+
+    time: float
+    disjunction: str
+    before: str
+    after: str
+
+    def __str__(self):
+        return f"time {self.time:.10g}: {self.disjunction}  {self.before} -> {self.after}"
+
+
+class Switches(list):
+    """The switches in order of time; prints one a line, and ``pandas.DataFrame(switches)`` has the fields as columns."""
+
+    def __repr__(self):
+        return '\n'.join(map(str, self)) or 'no switch'
+
+    __str__ = __repr__
+
+
+def switches(model: Block, wrt: ContinuousSet | None = None) -> Switches:
+    """Return the times at which a Disjunction, a surface of a piecewise function, or a hand-written Complementarity switches.
+
+    An element of a moving grid has one active set (eq. 11), so switches lie on element boundaries.
+
+    Returns
+    -------
+    Switches
+        list of ``Switch(time, disjunction, before, after)``
+    """
+    wrt = find_continuous_set(model, wrt, 'switches')
+    found, index = elements(wrt), TimeIndex(wrt)
+    times = physical_time(model, wrt)
+    systems = disjunction_modes(model, index) | complementarity_modes(model, wrt, index) | surface_sides(model, index)
+    changes = [Switch(times[t], name, *both) for name, modes in systems.items() for t, *both in _changes(modes, found)]
+    for _, label, name, after in jumps_that_happen(model, wrt):
+        before = [(x, value(x)) for x, _ in after]
+        changes.append(Switch(times[label], name, _state_values(before, index), _state_values(after, index)))
+    return Switches(sorted(changes, key=lambda s: s.time))
+
+
+def _changes(modes, found: tuple[Element, ...]) -> Iterator[tuple]:
+    """``(label, mode before, mode after)`` of one system."""
+    before = None
+    for element in found:
+        active = _active_mode(modes, element)
+        if active is not None:
+            if before is not None and active != before:
+                yield element.left, before, active
+            before = active
+
+
+def _active_mode(modes, element):
+    """The mode with a positive multiplier inside an element; several slide; None where no multiplier is clear."""
+    on = positive_modes(modes, element.points) or positive_modes(modes, (element.left,))
+    if not on:
+        return None
+    return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on)
+
+
+def _state_values(values, index):
+    return ', '.join(f'{strip_time(index.split(x)[1])} = {number:.6g}' for x, number in values)

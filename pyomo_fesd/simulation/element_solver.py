@@ -1,0 +1,171 @@
+"""Solve one element after the other, each up to the next switch, the end of a mode with hysteresis, or a state jump."""
+
+from dataclasses import replace
+
+from pyomo_fesd.core import TimeIndex, derivatives, moving_grids, phase
+from pyomo_fesd.simulation.determinacy import refuse_undetermined, refuse_undetermined_start
+from pyomo_fesd.simulation.element_class import ElementClass, ElementEnd
+from pyomo_fesd.simulation.equation_reader import EquationReader
+from pyomo_fesd.simulation.events import JumpEvents, read_hysteresis
+from pyomo_fesd.simulation.inputs import given_variables
+from pyomo_fesd.simulation.largest_residuals import largest_residuals
+from pyomo_fesd.simulation.progress import Progress
+from pyomo_fesd.simulation.step_sizes import SimulatedElement
+
+#: Parts of an element's length, or of the length aimed at if that is longer.  A step shorter than the first is none: the rest of a
+#: control stage after a switch may be as short as the solver's tolerances.  A step that misses its aim by more than the second has
+#: been cut short by an event.
+NO_STEP, CUT = 1e-9, 1e-7
+#: Options of the MPCC, tried in this order: a warm start from the last element; searches farther away; other starts.  A step of
+#: length zero is a local solution of its own where a switch lies on the left boundary, so the later ones search farther.
+TRIES = (
+    {'warm_start': True, 'lpec': 'reduced'},
+    {'lpec': 'full', 'relaxation': 'elastic'},
+    {'lpec': 'full'},
+    {'lpec': 'full', 'starts': 6},
+)
+
+
+class ElementSolver:
+    """Solves the elements of one moving grid in their order; errors say the ``progress``."""
+
+    def __init__(self, model, wrt, inputs, options, timer, progress: Progress):
+        self._model, self._first, self._options, self._timer = model, wrt.first(), options, timer
+        self._times, self._progress = TimeIndex(wrt), progress
+        self._moving = moving_grids(model)[wrt]
+        self._grid, self._hysteresis = self._moving.grid, read_hysteresis(self._moving)
+        self._jumps = JumpEvents(self._moving.state_jumps)
+        given = given_variables(model, self._times, inputs, self._moving.held)
+        given.update(v for some in self._hysteresis for e in self._grid.elements for v in some.variables(e.right))
+        self._reader = EquationReader(model, self._moving, self._times, given)
+        self._equations, self._classes, self._end = {}, {}, ElementEnd()
+
+    def find_initial_values(self) -> None:
+        """Find the values of the first time: algebraic variables, modes, and states that equations there determine."""
+        for modes in self._hysteresis:
+            modes.begin(self._first)
+            modes.set_weights(self._grid.elements[0])
+        equations = self._reader.first(self._first)
+        states = (v for d in derivatives(self._model, self._times.wrt) for v in d.get_state_var().values())
+        refuse_undetermined_start(equations, [v for v in states if self._times.time(v) == self._first and not v.fixed])
+        if equations.unknown:
+            initial = ElementClass(equations, None, (1.0,), self._options, self._timer, self._progress.deadline)
+            if not initial.find_initial_values(equations) or self._reader.active_set(self._first) is None:
+                self._solve_first_mpcc(initial.mpcc, equations)
+
+    def _solve_first_mpcc(self, mpcc, equations):
+        with phase(self._timer, 'mpcc'):
+            answer = mpcc.solve(equations)
+        self._progress.check_time()
+        if answer.stationarity != 'B':
+            residuals = largest_residuals(self._model, self._times, equations, mpcc.values)
+            raise self._progress.error(
+                f"no solution at time {self._progress.time:.6g}: {residuals or answer.reason or answer.outcome}",
+                "check the equations there, and the initial values",
+            )
+        mpcc.write(equations)
+
+    def begin_pass(self) -> None:
+        """Begin a pass at the first time."""
+        self._jumps.begin()
+        for modes in self._hysteresis:
+            modes.begin(self._first)
+        self._end = ElementEnd(self._reader.active_set(self._first))
+
+    def begin_stage(self) -> None:
+        """Begin a control stage: values of functions may jump with the controls."""
+        self._end = replace(self._end, values=None)
+
+    def end_pass(self) -> None:
+        """Set the multipliers of the hysteresis conditions."""
+        for modes in self._hysteresis:
+            modes.set_multipliers(self._grid, self._first)
+
+    def solve(self, element, aim: float, warm: bool) -> SimulatedElement:
+        """Solve the next element, up to the length ``aim`` or the first event; ``warm`` as in ``TRIES``."""
+        for modes in self._hysteresis:
+            modes.set_weights(element)
+        (h, end), last = self._step(element, aim, warm), len(element.own_labels)
+        while (position := min(self._arrivals(element), default=last)) < last:
+            # a function is zero at a collocation point already: the element ends there
+            h, end = self._step(element, h * self._grid.tau[position - 1], True)
+        self._end = end
+        events = [] if element is self._grid.elements[-1] else self._pass_boundary(element)
+        return SimulatedElement(h, end.activity, events)
+
+    def _arrivals(self, element):
+        return [position for source in (*self._hysteresis, self._jumps) for position in source.find_arrivals(element)]
+
+    def _pass_boundary(self, element):
+        # jumps first: conditions of modes are evaluated right of the boundary
+        events = [name for source in (self._jumps, *self._hysteresis) for name in source.pass_boundary(element)]
+        if events:
+            self._end = replace(self._end, values=None)
+        return events
+
+    def _step(self, element, most, warm):
+        """Solve one element with a length of at most ``most``; returns its length and its ``ElementEnd``."""
+        self._progress.check_time()
+        equations = self._read(element)
+        element_class, longest = self._class_of(equations, element), max(most, element.length)
+        found = element_class.newton_step(equations, self._end, most, lambda: self._values_before(equations, element))
+        if found is None:
+            found = self._mpcc_step(element_class, equations, most, TRIES[not warm :], NO_STEP * longest)
+        h, end = found
+        h = most if h > most - CUT * longest else h
+        self._moving.r[element.n].set_value(h / element.length, skip_validation=True)
+        return h, end
+
+    def _read(self, element):
+        if element.n not in self._equations:
+            with phase(self._timer, 'read'):
+                functions = {}
+                for source in (*self._hysteresis, self._jumps):
+                    functions |= source.event_functions(element)
+                self._equations[element.n] = self._reader.element(element, functions)
+        return self._equations[element.n]
+
+    def _class_of(self, equations, element):
+        key = equations.element_class
+        if key not in self._classes:
+            refuse_undetermined(equations)
+            self._classes[key] = ElementClass(
+                equations, element.length, self._grid.tau, self._options, self._timer, self._progress.deadline
+            )
+        return self._classes[key]
+
+    def _values_before(self, equations, element):
+        """Values that the unknowns of an element have at its left boundary."""
+        return [self._value_at(v, element.left) if self._times.time(v) is not None else v.value for v in equations.unknown]
+
+    def _value_at(self, v, label):
+        """Value of the counterpart of a variable at another time, or its own without one."""
+        try:
+            found = self._times.at(v, label).value
+        except KeyError:
+            found = None
+        return v.value if found is None else found
+
+    def _mpcc_step(self, element_class, equations, most, tries, least):
+        """A step longer than ``least`` where the next active set is unknown, or does not hold."""
+        for options in tries:
+            answer, h = element_class.mpcc_step(equations, most, options)
+            self._progress.check_time()
+            if answer.stationarity == 'B' and h > least:
+                return element_class.accept_mpcc(equations, most, h)
+        raise self._no_step(element_class, equations, most, answer)
+
+    def _no_step(self, element_class, equations, most, answer):
+        mpcc, now = element_class.mpcc, f"{self._progress.time:.6g}"
+        mpcc.solve_with_length(equations, most / element_class.nominal)
+        residuals = largest_residuals(self._model, self._times, equations, mpcc.values)
+        forced = f"; where one is forced, {residuals}" if residuals else ''
+        if answer.stationarity == 'B':
+            return self._progress.error(
+                f"no step is possible from time {now}{forced}",
+                "look for a bound that the solution reaches there, or for a state from which no mode leads on",
+            )
+        return self._progress.error(
+            f"no step was found from time {now}: {answer.outcome}{forced}",
+            "check the equations there; more elements help where the solution is steep",
+        )

@@ -1,0 +1,39 @@
+"""Variables over time whose values a simulation takes as given: inputs, prescribed states, controls held on each stage.
+
+Takes: a model on its moving grid.
+Leaves: equal values of a held control throughout its control stage.
+Does not apply: to states that are fixed at the first and the last time only, which a simulation leaves alone.
+"""
+
+from collections.abc import Iterable, Iterator
+
+from pyomo.common.collections import ComponentSet
+from pyomo.core import Block, Constraint, Var
+from pyomo.core.base.var import VarData
+
+from pyomo_fesd.core import TimeIndex, derivatives
+from pyomo_fesd.simulation.structural_key import variables_of
+
+
+def given_variables(model: Block, times: TimeIndex, inputs: Iterable[Var], held: Constraint) -> ComponentSet:
+    """Return the data of ``inputs``, of prescribed states, and of the controls in the equations ``held``."""
+    given = ComponentSet(v for u in inputs for v in u.values())
+    given.update(_prescribed_states(model, times))
+    given.update(v for row in held.values() for v in _hold_last_value(row, times))
+    return given
+
+
+def _prescribed_states(model, times) -> Iterator[VarData]:
+    """States fixed at every time are inputs, such as a flow at the end of a pipe that is a state inside it."""
+    for derivative in derivatives(model, times.wrt):
+        for over_time in times.families(derivative.get_state_var().values()).values():
+            if len(over_time) > 2 and all(v.fixed for v in over_time.values()):
+                yield from over_time.values()
+
+
+def _hold_last_value(row, times):
+    """Give the controls of one equation the value that the last of them has, and return them."""
+    *others, last = controls = sorted(variables_of([row.body]), key=times.time)
+    for control in others:
+        control.set_value(last.value, skip_validation=True)
+    return controls

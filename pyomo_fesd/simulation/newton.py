@@ -1,0 +1,83 @@
+"""Newton's method for one element with a given active set: equations, and the sides that are held at zero.
+
+Square systems are solved as they are; systems with more equations than unknowns (Gauss on a slide) in the least-squares sense, and
+accepted only if every residual vanishes.
+
+Does not apply: to singular systems; the answer is None.
+"""
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import lapack
+from scipy.sparse.linalg import splu
+
+from pyomo_fesd.simulation.element_residuals import ElementResiduals
+
+#: Up to this number of unknowns a dense factorisation is faster.
+DENSE = 150
+#: Largest residuals of a solution: relative to the terms of their sum, and in the solver's scale.
+EXACT, TINY = 1e-12, 1e-14
+#: Iterations of a method that converges quadratically.
+ITERATIONS = 12
+#: A matrix with a pivot below this part of its column is singular.
+SINGULAR = 1e-13
+
+
+class NewtonSystem:
+    """The system of equations V[rows] = 0 in the entries ``columns`` of w."""
+
+    def __init__(self, residuals: ElementResiduals, rows: np.ndarray, columns: np.ndarray):
+        self._residuals, self._rows, self._columns = residuals, rows, columns
+        self._shape = m, n = len(rows), len(columns)
+        row, column = np.full(residuals.V.size, -1), np.full(residuals.lower.size, -1)
+        row[rows], column[columns] = np.arange(m), np.arange(n)
+        i, j = row[residuals.rows], column[residuals.columns]
+        self._entries = np.flatnonzero((i >= 0) & (j >= 0))
+        self._i, self._j = i[self._entries], j[self._entries]
+        self._flat = self._i * n + self._j
+
+    def solve(self, w: np.ndarray) -> np.ndarray | None:
+        """Return a zero near ``w``; None if the method does not converge."""
+        w, columns = w.copy(), self._columns
+        for _ in range(ITERATIONS):
+            V, J = self._residuals.evaluate(w)
+            residual, entries = V[self._rows], J[self._entries]
+            if not (np.isfinite(residual).all() and np.isfinite(entries).all()):
+                return None
+            terms = np.bincount(self._i, np.abs(entries * w[columns][self._j]), self._shape[0])
+            step = self._step(entries, residual)
+            if step is None:
+                return None
+            w[columns] -= step
+            if (np.abs(residual) <= EXACT * terms + TINY).all():
+                return w
+        return None
+
+    def _step(self, entries, residual):
+        m, n = self._shape
+        if m < n:
+            return None
+        return self._dense(entries, residual) if n <= DENSE else self._sparse(entries, residual)
+
+    def _dense(self, entries, residual):
+        m, n = self._shape
+        M = np.bincount(self._flat, entries, m * n).reshape(m, n)
+        if m > n:
+            step, _, rank, _ = np.linalg.lstsq(M, residual, rcond=SINGULAR)
+            return step if rank == n else None
+        factors, pivots, info = lapack.dgetrf(M)
+        if info or (np.abs(np.diagonal(factors)) < SINGULAR * np.abs(M).max(axis=0)).any():
+            return None
+        return lapack.dgetrs(factors, pivots, residual)[0]
+
+    def _sparse(self, entries, residual):
+        m, n = self._shape
+        M = sparse.csc_matrix((entries, (self._i, self._j)), shape=(m, n))
+        try:
+            if m > n:
+                # the augmented form of the normal equations is better conditioned
+                augmented = sparse.bmat([[sparse.eye(m), M], [M.T, None]], format='csc')
+                return splu(augmented).solve(np.concatenate([residual, np.zeros(n)]))[m:]
+            return splu(M).solve(residual)
+        except RuntimeError:
+            return None

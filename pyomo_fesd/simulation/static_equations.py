@@ -1,0 +1,56 @@
+"""Solve equations without time before the simulation, such as an area that follows from a diameter.
+
+Takes: a model; the present values of its other variables without time are given.
+Leaves: values of the variables that these equations determine.
+Does not apply: to equations that hold already, and to equations that contain a variable over time.
+"""
+
+from pyomo.common.collections import ComponentSet
+from pyomo.contrib.solver.common.factory import SolverFactory
+from pyomo.contrib.solver.common.results import SolutionStatus
+from pyomo.core import Block, Constraint, value
+from pyomo.core.expr.visitor import identify_variables
+from pyomo.dae import ContinuousSet
+from pyomo.util.subsystems import create_subsystem_block
+
+from pyomo_fesd.core import FesdError, TimeIndex, is_generated
+
+#: An equation holds if its residual is smaller, relative to max(1, |body|).
+HOLDS = 1e-10
+
+
+def solve_static_equations(model: Block, wrt: ContinuousSet) -> None:
+    """Solve the equations without time if they do not hold.
+
+    Raises
+    ------
+    FesdError
+        naming an equation that cannot be solved
+    """
+    times = TimeIndex(wrt)
+    rows = [c for c in model.component_data_objects(Constraint, active=True, descend_into=Block) if _is_static(c, times)]
+    unknowns = ComponentSet(v for c in rows for v in identify_variables(c.body, include_fixed=False))
+    if all(map(_holds, rows)):
+        return
+    solver = SolverFactory('casadi_ipopt', raise_exception_on_nonoptimal_result=False, load_solutions=False)
+    block = create_subsystem_block(rows, list(unknowns))
+    results = solver.solve(block, solver_options={'tol': 1e-10})
+    if results.solution_status is not SolutionStatus.optimal:
+        raise FesdError(
+            next(c for c in rows if not _holds(c)),
+            f"simulate: this equation without time does not hold, and cannot be solved: {results.extra_info.solver_message}",
+            "give variables without time consistent values, or better starts",
+        )
+    results.solution_loader.load_vars()
+
+
+def _is_static(equation, times):
+    if not equation.equality or is_generated(equation) or times.time(equation) is not None:
+        return False
+    variables = list(identify_variables(equation.body, include_fixed=True))
+    return all(times.time(v) is None for v in variables) and any(not v.fixed for v in variables)
+
+
+def _holds(equation):
+    body = value(equation.body, exception=False)
+    return body is not None and abs(body - value(equation.upper)) <= HOLDS * max(1.0, abs(body))

@@ -1,0 +1,98 @@
+"""Code that both plug-ins share: the beginning of a solve, its end, and Pyomo's older solver interface."""
+
+import datetime
+import logging
+
+import casadi as ca
+from pyomo.common.timing import HierarchicalTimer
+from pyomo.contrib.solver.common.base import Availability, LegacySolverWrapper, SolverBase
+from pyomo.contrib.solver.common.results import Results, SolutionStatus
+from pyomo.contrib.solver.common.util import NoOptimalSolutionError
+from pyomo.core.staleflag import StaleFlagManager
+
+from pyomo_fesd.analysis import structure
+from pyomo_fesd.core import interruptible
+from pyomo_fesd.mpcc import Deadline
+
+logger = logging.getLogger('pyomo_fesd')
+
+
+class CasadiSolver(SolverBase):
+    """A solver that needs the Ipopt in casadi's wheel."""
+
+    def available(self) -> Availability:
+        """Whether casadi's wheel contains Ipopt."""
+        return Availability.FullLicense if ca.has_nlpsol('ipopt') else Availability.NotFound
+
+    def _begin(self, config):
+        """Empty results of a solve with ``config``, which gets a timer; all values of the model become stale."""
+        results = Results()
+        results.solver_name, results.solver_version, results.solver_config = self.name, self.version(), config
+        results.timing_info.start_timestamp = datetime.datetime.now(datetime.timezone.utc)
+        config.timer = results.timing_info.timer = config.timer or HierarchicalTimer()
+        StaleFlagManager.mark_all_as_stale()
+        return results
+
+    def _load(self, results):
+        """Load the solution if the options say so; returns whether it was loaded."""
+        found = results.solution_loader.get_number_of_solutions()
+        loads = bool(results.solver_config.load_solutions and found and not _raises(results))
+        if loads:
+            results.solution_loader.load_solution()
+        return loads
+
+    def _refuse_nonoptimal(self, results, message):
+        """Raise if the options say so."""
+        if _raises(results):
+            raise NoOptimalSolutionError(f"{self.name}: {message}")
+
+
+def _raises(results):
+    """Whether the options ask for an exception instead of these results."""
+    optimal = results.solution_status is SolutionStatus.optimal
+    return results.solver_config.raise_exception_on_nonoptimal_result and not optimal
+
+
+def deadline(config, started: float) -> Deadline:
+    """The deadline that the option ``time_limit`` sets, counted from ``time.perf_counter()`` at the start."""
+    return Deadline(None if config.time_limit is None else started + config.time_limit)
+
+
+def with_structure(message: str, model) -> str:
+    """``message`` and, if the model has not one equation for every unknown, the problem that ``structure`` finds."""
+    problem = review(lambda: structure(model).problem, lambda failure: None)
+    return '; '.join(part for part in (message, problem) if part)
+
+
+def review(look, instead):
+    """What ``look`` finds in a result; where it fails, what ``instead`` makes of a sentence on that: no review costs a result."""
+    try:
+        return look()
+    except Exception as error:  # whatever it is, the solve has ended well
+        failure = f"a review of the result failed with {type(error).__name__}: {error}"
+        logger.warning("%s", failure)
+        return instead(failure)
+
+
+class LegacyPlugin(LegacySolverWrapper):
+    """``pyomo.environ.SolverFactory`` interface: no option of one call outlives it; ``extra_info`` goes to ``results.solver``."""
+
+    @interruptible
+    def solve(self, model, **kwds):
+        """Solve ``model`` as in the new interface."""
+        kept = self.config.value()
+        try:
+            return super().solve(model, **self._own_keywords(kwds))
+        finally:
+            self.config.solver_options.reset()
+            self.config.set_value(kept)
+
+    def _own_keywords(self, kwds):
+        """Keywords for Pyomo's wrapper, which knows only its own."""
+        return kwds
+
+    def _map_results(self, model, results):
+        legacy, solution = super()._map_results(model, results)
+        for name, entry in results.extra_info.items():
+            setattr(legacy.solver, name, entry)
+        return legacy, solution

@@ -1,0 +1,47 @@
+"""Refuse models that are not ready for a solver: active components that it would ignore, and a time that is not discretised."""
+
+from pyomo.core import Block, LogicalConstraint, SOSConstraint, Var
+from pyomo.dae import DerivativeVar, Integral
+from pyomo.gdp import Disjunct, Disjunction
+
+from pyomo_fesd.core import FesdError, all_switched_systems, continuous_sets, moving_grids, refuse_no_model
+
+#: Components that must not be active -> fix.
+REFUSED = {
+    Disjunction: "apply fesd.dcs (over time) or a pyomo.gdp transformation first",
+    Disjunct: "deactivate it, or apply fesd.dcs (over time) or a pyomo.gdp transformation first",
+    LogicalConstraint: "apply core.logical_to_linear and a GDP transformation, or deactivate it",
+    SOSConstraint: "write it as a Complementarity, or deactivate it",
+    Integral: "discretise the model first, e.g. with fesd.finite_elements",
+    DerivativeVar: "discretise the model first, e.g. with fesd.finite_elements",
+}
+
+
+def refuse_unready(model: Block, solver: str) -> None:
+    """Check that ``solver`` (its name) can solve ``model``.
+
+    Raises
+    ------
+    FesdError
+        for active Disjunctions, logic, SOS, derivatives and integrals, for integer variables, and for modes with hysteresis or
+        state jumps on elements that do not move
+    """
+    refuse_no_model(model, solver)
+    for ctype, fix in REFUSED.items():
+        found = next(model.component_data_objects(ctype, active=True, descend_into=Block), None)
+        if found is not None:
+            raise FesdError(found, f"an active {ctype.__name__}, which {solver} does not handle", fix)
+    for v in model.component_data_objects(Var, active=True, descend_into=Block):
+        if not v.fixed and not v.is_continuous():
+            raise FesdError(v, "an integer variable", f"fix it, or relax its domain: {solver} does not decide integers")
+    grids = moving_grids(model)
+    for component, kind in _need_moving_elements(model):
+        if not any(wrt in grids for wrt in continuous_sets(component)):
+            raise FesdError(component, f"{kind} on a grid whose elements do not move", "apply fesd.finite_elements first")
+
+
+def _need_moving_elements(model):
+    """Components whose equations only ``fesd.finite_elements`` can write, with their kind."""
+    systems = all_switched_systems(model)
+    yield from ((mode.disjunction, "a mode with hysteresis") for mode in systems.hysteresis)
+    yield from ((reset.block, "a state jump") for reset in systems.resets)

@@ -1,0 +1,139 @@
+"""Coinciding switches: every order of them is tried before a point is certified."""
+
+import pyomo.environ as pyo
+import pytest
+from pyomo.mpec import Complementarity
+
+import pyomo_fesd
+from pyomo_fesd.core import all_hints, moving_grids
+from pyomo_fesd.finite_elements.coincidences import switching_together
+from tests.models import dcs
+from tests.problems import carried, kink_at_stage, two_experiments
+from tests.problems.running import move, transform
+
+
+def coincidences(m):
+    return all_hints(m).coincidences
+
+
+# What is written
+
+
+@pytest.mark.parametrize('form', ['heaviside', 'stewart'])
+def test_each_experiment_switches_for_itself(form):
+    m = transform(two_experiments.build(), 4, form=form)
+    families = switching_together(moving_grids(m)[m.t])
+    assert len(families) == 4 and len(set(families.values())) == 2
+
+
+def test_modes_with_hysteresis_switch_with_their_disjunction():
+    m = two_experiments.build()
+    move(dcs(m, hysteresis=[m.law]), 4, 2)
+    assert sorted(set(switching_together(moving_grids(m)[m.t]).values())) == ['law[1]', 'law[2]']
+
+
+def test_a_change_takes_over_the_pairs_of_its_family():
+    m = transform(two_experiments.build(), 4, form='heaviside')
+    second = coincidences(m)[1]
+    assert not second.fixed and len(second.changes) == 2
+    for i, change in enumerate(second.changes, start=1):
+        assert {pair.ctype for pair, _ in change.differing} == {Complementarity}
+        assert [(pair.index()[1], source.index()[1]) for pair, source in change.later] == [(3, 2), (3, 2)]
+        assert [(pair.index()[1], source.index()[1]) for pair, source in change.earlier] == [(2, 3), (2, 3)]
+        assert all(f'[{i},' in pair.index()[0] for pair, _ in change.differing)
+
+
+def test_where_no_element_is_left_there_is_no_place():
+    m = transform(two_experiments.build(), 3)
+    r = moving_grids(m)[m.t].r
+    first, last = coincidences(m)
+    assert first.earlier is None and first.later is r[2]
+    assert last.earlier is r[2] and last.later is None
+
+
+def test_a_single_system_has_them_at_boundaries_of_control_stages_only():
+    m = transform(carried.build(), 6)
+    (found,) = coincidences(m)
+    assert found.fixed and found.earlier is moving_grids(m)[m.t].r[3]
+
+
+# What they find
+
+
+def simulated(m, theta):
+    m.theta.fix(theta)
+    pyomo_fesd.simulate(m)
+    m.theta.unfix()
+
+
+def solved(m, **options):
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, **options)
+    return pyo.value(m.misfit), results.solver.stationarity
+
+
+@pytest.mark.parametrize('warm_start', [True, False])
+@pytest.mark.parametrize('start', [0.4, 0.8, 1.0])
+@pytest.mark.parametrize('nfe', [3, 4, 6])
+@pytest.mark.parametrize('form', ['heaviside', 'stewart'])
+def test_a_fit_passes_the_point_where_switches_coincide(form, nfe, start, warm_start):
+    m = transform(two_experiments.build(start), nfe, form=form)
+    simulated(m, start)
+    misfit, stationarity = solved(m, warm_start=warm_start)
+    assert stationarity == 'B'
+    assert m.theta.value == pytest.approx(two_experiments.TRUE, abs=1e-8) and misfit < 1e-12
+
+
+def test_with_hysteresis():
+    m = two_experiments.build(1.0)
+    move(dcs(m, hysteresis=[m.law]), 4, 2)
+    simulated(m, 1.0)
+    misfit, stationarity = solved(m, warm_start=True)
+    assert stationarity == 'B' and misfit < 1e-12
+
+
+def test_without_a_spare_element_the_verdict_says_so():
+    m = transform(two_experiments.build(), 2)
+    simulated(m, 1.0)
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=True)
+    if pyo.value(m.misfit) > 1e-9:
+        assert results.solver.stationarity == 'not certified' and 'order' in results.solver.reason
+        assert not pyomo_fesd.certify(m).certified
+
+
+def test_certify_looks_at_the_orders_too():
+    m = transform(two_experiments.build(), 4)
+    simulated(m, 1.0)
+    assert pyo.value(m.misfit) == pytest.approx(two_experiments.FALSE_MISFIT)
+    assert not pyomo_fesd.certify(m).certified
+    solved(m, warm_start=True)
+    assert pyomo_fesd.certify(m).certified
+
+
+@pytest.mark.parametrize('number', [2, 3])
+@pytest.mark.parametrize('common', [lambda theta: theta, lambda theta: theta * (theta + 1) / 2])
+def test_equal_systems_stay_together_and_are_certified(common, number):
+    m = two_experiments.build(0.6, (common,) * number)
+    m.misfit.set_value(m.misfit.expr + 0.1 * (m.theta - 1) ** 2)  # so that the objective has a slope
+    transform(m, 3)
+    simulated(m, 0.6)
+    assert solved(m, warm_start=True)[1] == 'B'
+
+
+@pytest.mark.parametrize('warm_start', [True, False])
+@pytest.mark.parametrize('A', [-0.3, 0.5, 4.0])
+def test_a_kink_at_the_boundary_of_a_control_stage(A, warm_start):
+    m = kink_at_stage.build(A)
+    move(dcs(m), 4, 2, piecewise_constant=[m.u])
+    pyomo_fesd.simulate(m)
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=warm_start)
+    u, fuel = kink_at_stage.best(A)
+    assert results.solver.stationarity == 'B'
+    assert pyo.value(m.fuel) == pytest.approx(fuel, abs=1e-8) and m.u[1].value == pytest.approx(u, abs=1e-5)
+
+
+def test_with_one_element_in_each_control_stage_the_verdict_says_so():
+    m = kink_at_stage.build(4.0)
+    move(dcs(m), 2, 2, piecewise_constant=[m.u])
+    results = pyo.SolverFactory('mpec_hybrid').solve(m)
+    assert pyo.value(m.fuel) > kink_at_stage.best(4.0)[1] + 0.1
+    assert results.solver.stationarity == 'not certified' and 'order' in results.solver.reason

@@ -1,0 +1,199 @@
+"""Branches: solved once, certified, kept if better, and left where the LPEC shows a way down."""
+
+import numpy as np
+import pyomo.environ as pyo
+import pytest
+from problems import mpcc_collection, small_mpccs
+from problems.parts import parts
+from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd.mpcc.algorithm import branches
+from pyomo_fesd.mpcc.algorithm.state import Outcome, Stop
+from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO, active_sets
+from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
+
+
+def trap(multiplier=2):
+    """On x = 0 the minimum is the origin, with multipliers (-2, ``multiplier``); along y = 0 it descends to (1, 0)."""
+    m = small_mpccs.pair(0.0, 0.1)
+    m.f = pyo.Objective(expr=(m.x - 1) ** 2 + m.y**2 + multiplier * m.y)
+    return m
+
+
+def c_stationary():
+    """The trap with multipliers (-2, 0): a C-stationary origin."""
+    return trap(0)
+
+
+def two_minima(x0=0.0, y0=1.0):
+    """(0, 1) with 1 and (1, 0) with 1/2: both strict, each within the other's trust region."""
+    m = small_mpccs.pair(x0, y0)
+    m.f = pyo.Objective(expr=(m.x - 1) ** 2 + (m.y - 1) ** 2 / 2)
+    return m
+
+
+def at_point(m, final, **options):
+    """Parts after ``explore_from`` the model's values; with the reduced LPEC by default."""
+    p = parts(m, **{'lpec': 'reduced'} | options)
+    p.branches.explore_from(p.compiled.x0, final)
+    return p
+
+
+def test_a_stationary_incumbent_is_left_along_the_lpecs_direction():
+    p = at_point(trap(), True)
+    assert [step.status for step in p.kinds('certificate')] == ['DESCENT', 'B']
+    assert p.run.point.w == pytest.approx(p.point(x=1.0, y=0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize('final', [False, True])
+def test_a_side_that_ipopt_leaves_above_the_tolerance_hides_no_descent(final):
+    p = at_point(c_stationary(), final)  # ends at y = 6e-6
+    assert p.run.point.w == pytest.approx(p.point(x=1.0, y=0.0), abs=1e-6)
+
+
+def test_it_is_kept_uncertified_while_the_homotopy_promises_something_better():
+    p = at_point(trap(), False)
+    assert p.run.point.certificate.grade is Stationarity.DESCENT
+    assert p.run.point.f == pytest.approx(1)
+
+
+def test_a_closed_gap_lets_it_descend():
+    p = parts(trap(), lpec='reduced')
+    p.gap.add(1e-3, 1.0)
+    p.branches.explore_from(p.compiled.x0, False)
+    assert p.run.point.certificate.certified
+
+
+def test_where_the_step_overshoots_the_trust_region_shrinks():
+    """Down along x to 1/2, where the branch's NLP has a wall: from the step's end at 1 it is not reached, from nearby it is."""
+    m = trap()
+    m.wall = pyo.Constraint(expr=m.x <= 0.5)
+    p = at_point(m, True)
+    assert p.run.point.certificate.certified
+    assert p.run.point.w == pytest.approx(p.point(x=0.5, y=0.0), abs=1e-6)
+
+
+def test_a_solved_branch_is_not_solved_again():
+    p = at_point(two_minima(), False)
+    assert len(p.kinds('branch')) == 1
+    p.branches.explore_from(p.compiled.x0, False)
+    assert len(p.kinds('branch')) == 1
+    p.branches.forget()
+    p.branches.explore_from(p.compiled.x0, False)
+    assert len(p.kinds('branch')) == 2
+
+
+def test_a_branch_that_fails_gets_as_many_tries_as_are_set():
+    m = two_minima()
+    m.far = pyo.Constraint(expr=m.x**2 + m.y >= 1.5)
+    m.near = pyo.Constraint(expr=m.y + m.y**2 <= 1)
+    p = parts(m)
+    zero = active_sets(np.zeros(1), np.ones(1), 0.0).zero
+    for _ in range(branches.TRIES + 2):
+        p.branches.explore_from(p.compiled.x0, False)
+    assert p.run.point is None
+    assert p.branches.tried(zero)
+    assert len(p.kinds('branch')) == branches.TRIES
+
+
+def test_certified_comes_before_a_lower_objective():
+    p = parts(two_minima(), lpec='reduced')
+    for x, y in ((0.0, 1.0), (1.0, 0.0), (0.0, 1.0)):
+        p.branches.explore_from(np.array(p.point(x=x, y=y)), False)
+    assert p.run.point.f == pytest.approx(0.5)
+    assert p.run.point.certificate.certified
+
+
+@pytest.mark.parametrize(('lpec', 'best'), [('reduced', 1.0), ('full', 0.5), ('auto', 0.5)])
+def test_only_the_full_lpec_looks_beyond_a_strict_minimum(lpec, best):
+    p = at_point(two_minima(), True, lpec=lpec)
+    assert p.run.point.certificate.grade is Stationarity.B
+    assert p.run.point.f == pytest.approx(best)
+
+
+@pytest.mark.parametrize('options', [{'eps_init': 1e-2}, {'eps_init': 1e-4}, {'eps_init': 1e-6}], ids=str)
+@pytest.mark.parametrize(('lpec', 'best'), [('reduced', 1.0), ('full', 0.5)])
+def test_so_does_the_solver_wherever_its_run_begins(options, lpec, best):
+    m = two_minima(1e-3, 1.0)
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, lpec=lpec, **options)
+    assert results.solver.stationarity == 'B'
+    assert pyo.value(m.f) == pytest.approx(best, abs=1e-6)
+
+
+@pytest.mark.parametrize('lpec', ['reduced', 'full'])
+def test_a_warm_start_stays_at_the_minimum_next_to_it(lpec):
+    m = two_minima()
+    assert pyo.SolverFactory('mpec_hybrid').solve(m, lpec=lpec, warm_start=True).solver.stationarity == 'B'
+    assert pyo.value(m.f) == pytest.approx(1)
+
+
+def test_the_full_lpec_reaches_the_optimum_of_bilin():
+    m = mpcc_collection.bilin()
+    assert pyo.SolverFactory('mpec_hybrid').solve(m, lpec='full').solver.stationarity == 'B'
+    assert pyo.value(m.f) == pytest.approx(18.4)
+
+
+def test_a_smaller_trust_region_keeps_the_full_lpec_near():
+    p = at_point(two_minima(), True, lpec='full', trust_radius=0.1)
+    assert p.run.point.f == pytest.approx(1)
+
+
+def test_without_an_own_solution_the_lpec_names_another_branch():
+    """The active sets name x = 0, which the row forbids; the LPEC over the bi-active pair says y = 0."""
+    m = small_mpccs.pair(0.1, 0.2)
+    m.row = pyo.Constraint(expr=m.x - m.y >= 0.05)
+    m.f = pyo.Objective(expr=(m.x - 1) ** 2 + m.y)
+    p = parts(m)
+    relaxed = p.subsolves.relax('scholtes', p.compiled.x0, 1e-2, None, None)
+    p.branches.explore(relaxed, active_sets(np.zeros(1), np.full(1, 1e-3), 1.0), False)
+    assert p.kinds('lpec')
+    assert p.run.point.w == pytest.approx(p.point(x=1.0, y=0.0), abs=1e-6)
+
+
+def many(count=40):
+    """A knapsack in pairs: hard for branch and bound, with a row that keeps the bounds apart."""
+    random = np.random.default_rng(5)
+    m, pairs = pyo.ConcreteModel(), range(count)
+    m.x = pyo.Var(pairs, bounds=(0, 1), initialize=0.0)
+    m.y = pyo.Var(pairs, bounds=(0, 1), initialize=0.0)
+    m.c = Complementarity(pairs, rule=lambda m, i: complements(m.x[i] >= 0, m.y[i] >= 0))
+    weight = random.uniform(1, 2, (5, count))
+    m.rows = pyo.Constraint(range(5), rule=lambda m, k: sum(weight[k, i] * (m.x[i] + 0.9 * m.y[i]) for i in pairs) == count / 4)
+    value = random.uniform(1, 2, (2, count))
+    m.f = pyo.Objective(expr=-sum(value[0, i] * m.x[i] + value[1, i] * m.y[i] for i in pairs))
+    return m
+
+
+@pytest.mark.parametrize('limit', [{'mip_max_nodes': 0}, {'time_limit': 0.0}], ids=str)
+def test_a_suggestion_stops_at_its_limit_and_then_keeps_what_the_point_shows(monkeypatch, limit):
+    monkeypatch.setattr('pyomo_fesd.mpcc.algorithm.subsolves.SUGGESTION', limit)
+    monkeypatch.setattr('pyomo_fesd.mpcc.algorithm.subsolves.LEAST_TIME', limit.get('time_limit', 1e-3))
+    p = parts(many())
+    at = p.compiled.evaluate(p.compiled.x0)
+    sets = active_sets(at.G, at.H, 1e-6)
+    result = p.subsolves.suggestion(p.compiled.x0, sets, 1.0)
+    assert p.kinds('lpec')[0].seconds < 2
+    assert set(result.zero) <= {G_ZERO, H_ZERO}
+    if not result.solved or not result.d.any():
+        np.testing.assert_array_equal(result.zero, sets.zero)
+
+
+def test_a_limit_of_its_own_does_not_take_an_lpec_beyond_the_deadline():
+    p = parts(many(120))
+    p.subsolves._lpec._deadline.at = 0.0
+    at = p.compiled.evaluate(p.compiled.x0)
+    result = p.subsolves._lpec.solve(p.compiled.x0, active_sets(at.G, at.H, 1e-6), 1.0, limits={'time_limit': 60.0})
+    assert not result.solved or not result.d.any()
+
+
+def test_a_point_beyond_all_measure_is_unbounded_only_where_the_objective_fell():
+    m = small_mpccs.pair(1.0, 0.0)
+    m.f = pyo.Objective(expr=-m.x)
+    p = parts(m)
+    with pytest.raises(Stop) as stop:
+        p.branches.explore_from(p.compiled.x0, True)
+    assert stop.value.outcome is Outcome.UNBOUNDED
+    m, _ = small_mpccs.ralph2()
+    p = parts(m)
+    p.branches.explore_from(np.array(p.point(x=1e20, y=0.0)), False)
+    assert p.run.point is None or p.run.point.f == pytest.approx(0, abs=1e-6)

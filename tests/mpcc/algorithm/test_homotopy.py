@@ -1,0 +1,170 @@
+"""The path of relaxations: how eps falls, where it ends, and the mode that is nothing else."""
+
+import numpy as np
+import pyomo.environ as pyo
+import pytest
+from problems import mpcc_collection, small_mpccs
+from problems.parts import compiled
+from pyomo.contrib.solver.common.factory import SolverFactory as SolverFactoryV2
+from pyomo.contrib.solver.common.results import SolutionStatus, TerminationCondition
+from pyomo.contrib.solver.common.util import NoOptimalSolutionError
+from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd.mpcc.algorithm.recovery import RECOVERIES
+from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS
+
+PROBLEMS = [small_mpccs.toy, small_mpccs.bard1, small_mpccs.ralph1, small_mpccs.badly_scaled, small_mpccs.mixed]
+RELAXED = "relaxation solved down to the last eps; nothing is certified"
+
+
+def run(m, **options):
+    """Results in the new interface, without an exception."""
+    return SolverFactoryV2('mpec_hybrid').solve(m, raise_exception_on_nonoptimal_result=False, **options)
+
+
+def relaxations(results):
+    return [step for step in results.extra_info.steps if step.kind == 'relaxation']
+
+
+def product(c, step):
+    at = c.evaluate(step.w)
+    return np.max(at.G * at.H, initial=0.0)
+
+
+# how eps falls
+
+
+@pytest.mark.parametrize('mode', ['hybrid', 'relaxation'])
+@pytest.mark.parametrize('form', ['scholtes', 'elastic', 'kanzow_schwartz', 'steffensen_ulbrich'])
+@pytest.mark.parametrize('problem', PROBLEMS, ids=lambda f: f.__name__)
+def test_the_next_eps_is_a_part_of_the_last_or_of_the_largest_product(problem, form, mode):
+    m = problem()[0]
+    results = run(m, mode=mode, relaxation=form, eps_factor=0.2)
+    assert not any(step.kind == 'recovery' for step in results.extra_info.steps)
+    c, path = compiled(m), relaxations(results)
+    assert path[0].eps == 1.0
+    for before, after in zip(path, path[1:]):
+        assert after.eps == pytest.approx(max(0.2 * min(before.eps, product(c, before)), 1e-9))
+
+
+def test_where_the_elastic_form_is_complementary_at_once_eps_jumps_to_the_end():
+    m = small_mpccs.toy(0.5, 0.2)[0]
+    path = relaxations(run(m, mode='relaxation', relaxation='elastic'))
+    assert path[-1].eps == 1e-9
+    assert len(path) < 5 < len(relaxations(run(small_mpccs.toy(0.5, 0.2)[0], mode='relaxation', relaxation='scholtes')))
+
+
+def test_it_starts_and_ends_at_the_given_eps():
+    path = relaxations(run(small_mpccs.toy(0.5, 0.2)[0], mode='relaxation', eps_init=0.3, eps_final=1e-4))
+    assert (path[0].eps, path[-1].eps) == (0.3, 1e-4)
+
+
+# where it ends
+
+
+def test_a_certified_incumbent_that_the_gap_test_accepts_ends_it():
+    results = run(small_mpccs.toy(0.5, 0.2)[0])
+    path = relaxations(results)
+    assert results.extra_info.stationarity == 'B'
+    assert path[-1].eps > 1e-6
+    assert results.incumbent_objective - path[-1].f < 5e-4
+
+
+def test_a_failed_relaxation_is_followed_by_the_recoveries_in_their_order():
+    m = mpcc_collection.infeasible()
+    # so many pairs that not all branches are searched first
+    m.a, m.b = pyo.Var(range(6), bounds=(0, None), initialize=1), pyo.Var(range(6), bounds=(0, None), initialize=1)
+    m.more = Complementarity(range(6), rule=lambda m, i: complements(m.a[i] >= 0, m.b[i] >= 0))
+    results = run(m, relaxation='scholtes', load_solutions=False)
+    notes = [step.status for step in results.extra_info.steps if step.kind == 'recovery']
+    assert notes[: len(RECOVERIES)] == [recovery.note for recovery in RECOVERIES]
+    eps = [step.eps for step in relaxations(results)]
+    assert eps[2] == pytest.approx(eps[1] / np.sqrt(0.1))
+    assert max(eps) == 100
+    assert notes[len(RECOVERIES) : len(RECOVERIES) + 2] == ['search over the pairs', 'start elsewhere']
+
+
+@pytest.mark.parametrize('build', [small_mpccs.bard1, mpcc_collection.no_objective])
+def test_auto_begins_with_the_elastic_form(build):
+    paths = [relaxations(run(model_of(build), relaxation=form)) for form in ('auto', 'elastic')]
+    assert [(s.eps, s.iterations) for s in paths[0]] == [(s.eps, s.iterations) for s in paths[1]]
+
+
+def model_of(build):
+    made = build()
+    return made[0] if isinstance(made, tuple) else made
+
+
+@pytest.mark.parametrize('mode', ['hybrid', 'relaxation'])
+def test_the_iteration_limit_ends_it_after_the_nlp_that_reached_it(mode):
+    results = run(small_mpccs.bard1()[0], mode=mode, max_iterations=10)
+    assert results.termination_condition is TerminationCondition.iterationLimit
+    iterations = [step.iterations for step in results.extra_info.steps]
+    assert sum(iterations) >= 10 > sum(iterations) - max(iterations)
+
+
+# the mode that is nothing else
+
+
+@pytest.mark.parametrize('form', ['auto', *RELAXATIONS])
+def test_relaxation_mode_states_residuals_and_certifies_nothing(form):
+    m = small_mpccs.bard1()[0]
+    results = run(m, mode='relaxation', relaxation=form)
+    info = results.extra_info
+    assert info.outcome == RELAXED
+    assert results.termination_condition is TerminationCondition.unknown
+    feasible = max(info.complementarity_scaled, info.violation_scaled) <= 1e-6
+    assert results.solution_status is (SolutionStatus.feasible if feasible else SolutionStatus.infeasible)
+    assert info.stationarity == 'not certified'
+    # where one side is exact, the other may be as large as sqrt(eps_final) in the forms in t
+    assert info.complementarity <= 1e-4 and info.violation <= 1e-6
+    assert {step.kind for step in info.steps} == {'relaxation'}
+    assert (info.lpecs, info.binaries) == (0, 0)
+    assert results.incumbent_objective == pytest.approx(pyo.value(m.f))
+    # 17 is the optimum, another minimum has more
+    assert pyo.value(m.f) >= 17 - 1e-3
+
+
+def test_relaxation_mode_in_the_legacy_interface():
+    m = small_mpccs.toy(0.5, 0.2)[0]
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, mode='relaxation')
+    assert not pyo.check_optimal_termination(results)
+    assert results.solver.outcome == RELAXED
+    assert pyo.value(m.f) == pytest.approx(1, abs=1e-4)
+
+
+def test_relaxation_mode_raises_in_the_new_interface_as_any_uncertified_point_does():
+    with pytest.raises(NoOptimalSolutionError, match='nothing is certified'):
+        SolverFactoryV2('mpec_hybrid').solve(small_mpccs.toy()[0], mode='relaxation')
+
+
+def test_a_coarse_last_eps_leaves_a_point_that_is_called_infeasible_with_its_residual():
+    results = run(small_mpccs.toy(0.5, 0.2)[0], relaxation='scholtes', mode='relaxation', eps_final=1e-2)
+    assert results.extra_info.outcome == RELAXED
+    assert results.solution_status is SolutionStatus.infeasible
+    assert 1e-4 < results.extra_info.complementarity < 1e-1
+
+
+@pytest.mark.parametrize('form', ['scholtes', 'elastic'])
+def test_multipliers_of_a_relaxation_can_be_loaded_also_with_a_slack(form):
+    m = small_mpccs.toy(0.5, 0.2)[0]
+    costs = run(m, mode='relaxation', relaxation=form).solution_loader.get_reduced_costs()
+    assert set(v.name for v in costs) == {'x', 'y'}
+
+
+def test_a_limit_in_relaxation_mode_leaves_the_last_relaxation_and_not_the_first():
+    results = run(small_mpccs.bard1()[0], relaxation='scholtes', mode='relaxation', max_iterations=30)
+    assert results.termination_condition is TerminationCondition.iterationLimit
+    assert results.incumbent_objective == pytest.approx(relaxations(results)[-1].f)
+    assert results.extra_info.complementarity < 1e-4
+
+
+def test_relaxation_mode_of_an_infeasible_problem():
+    """The path of products ends before the last eps; that with a slack reaches it, and the residual says what is left."""
+    products, slack = (run(mpcc_collection.infeasible(), mode='relaxation', relaxation=f) for f in ('scholtes', 'elastic'))
+    assert products.termination_condition is TerminationCondition.locallyInfeasible
+    assert products.extra_info.violated[0][0] == 'c'
+    assert products.incumbent_objective is None
+    assert slack.extra_info.outcome == RELAXED
+    assert slack.solution_status is SolutionStatus.infeasible
+    assert slack.extra_info.complementarity == pytest.approx(0.5, abs=1e-3)

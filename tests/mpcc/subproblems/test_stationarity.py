@@ -1,0 +1,62 @@
+"""The certificate judges points, whoever found them."""
+
+import pyomo.environ as pyo
+import pytest
+from problems import small_mpccs
+
+import pyomo_fesd
+from pyomo_fesd.core import FesdError
+from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
+
+
+def test_the_origin_of_the_toy_is_refused_with_a_direction_of_descent():
+    model, _ = small_mpccs.toy(0.0, 0.0)
+    certificate = pyomo_fesd.certify(model)
+    assert certificate.grade is Stationarity.DESCENT
+    assert not certificate.certified
+    assert certificate.value < -1
+    assert certificate.biactive == 1
+
+
+@pytest.mark.parametrize('x, y', [(1.0, 0.0), (0.0, 1.0)])
+def test_both_minima_of_the_toy_are_certified(x, y):
+    model, _ = small_mpccs.toy(x, y)
+    assert pyomo_fesd.certify(model).grade is Stationarity.B
+
+
+def test_a_minimum_without_multipliers_is_certified():
+    model, _ = small_mpccs.ralph1()
+    model.x.value = model.y.value = 0.0
+    assert pyomo_fesd.certify(model).certified
+
+
+def test_a_point_that_is_not_complementary_is_called_infeasible():
+    model, _ = small_mpccs.toy(0.5, 0.5)
+    certificate = pyomo_fesd.certify(model)
+    assert certificate.grade is Stationarity.INFEASIBLE
+    assert certificate.complementarity == pytest.approx(0.5)
+
+
+def test_a_point_that_violates_a_constraint_is_called_infeasible():
+    model, _ = small_mpccs.toy(1.0, 0.0)
+    model.k = pyo.Constraint(expr=model.x <= 0.5)
+    certificate = pyomo_fesd.certify(model)
+    assert certificate.grade is Stationarity.INFEASIBLE
+    assert certificate.violation == pytest.approx(0.5)
+
+
+def test_certify_leaves_nothing_on_the_model_and_no_value_changed():
+    model, _ = small_mpccs.bard1()
+    before = [v.value for v in model.component_data_objects(pyo.Var)]
+    names = set(model.component_map())
+    pyomo_fesd.certify(model)
+    assert set(model.component_map()) == names
+    assert [v.value for v in model.component_data_objects(pyo.Var)] == before
+    assert all(c.active for c in model.c.values())
+
+
+def test_a_model_without_values_is_not_judged():
+    model, _ = small_mpccs.toy()
+    model.y.value = None
+    with pytest.raises(FesdError, match=r'(?s)y: has no value that could be judged\n.*solve the model first'):
+        pyomo_fesd.certify(model)
