@@ -2,10 +2,11 @@
 
 Takes: a solved model and its compiled MPCC.
 Leaves: messages.
-Does not apply: to states with a ``scaling_factor``, or that are 0.
+Does not apply: to states with a ``scaling_factor``, or that are 0 to round-off of that size.
 """
 
 import logging
+import sys
 
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block
@@ -16,6 +17,8 @@ logger = logging.getLogger('pyomo_fesd')
 
 #: A state below this part of the size by which it was scaled is only known to a few digits.
 TINY = 1e-5
+#: A state below this part of it is 0: a slide along x = 0 leaves 1e-48 on one machine and 0 on another.
+ROUND_OFF = sys.float_info.epsilon
 MESSAGE = (
     "%s: its values are at most %.1e, but it started from values of size %.1e, to which tolerances are relative: the solution may "
     "be inaccurate. Give start values of its size, none at all, or a scaling_factor."
@@ -31,7 +34,7 @@ def warn_small_states(model: Block, compiled) -> list[str]:
         if component in states and v.value is not None:
             states[component] = max(states[component], abs(v.value))
             sizes[component] = max(1 / factor, sizes.get(component, 0.0))
-    found = [(c, states[c], size) for c, size in sizes.items() if 0 < states[c] < TINY * size]
+    found = [(c, states[c], size) for c, size in sizes.items() if ROUND_OFF * size < states[c] < TINY * size]
     messages = [MESSAGE % (c.name, now, size) for c, now, size in found]
     for message in messages:
         logger.warning(message)
