@@ -4,7 +4,7 @@ As soon as the active sets of a relaxation look settled, the branch NLP that the
 objective promises less than the incumbent's (gap test), and eps may rise again when a relaxation fails.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,7 @@ ROUND_OFF = 1.001
 @dataclass(frozen=True)
 class _Position:
     """A position: the path's number, start and eps; form, result and active sets of the relaxation before, and the objective of
-    the branch that they named.
+    the branch that they named; whether the relaxation goes on from where its budget of iterations ended.
     """
 
     path: int
@@ -44,6 +44,7 @@ class _Position:
     duals: NlpResult = None
     sets: ActiveSets = None
     named: float = None
+    goes_on: bool = False
 
 
 class Homotopy:
@@ -85,14 +86,19 @@ class Homotopy:
             position = (self._next if self._subsolves.usable(relaxed) else self._recover)(position, relaxed)
 
     def _relax(self, position):
-        form = self._form(position)
-        duals = position.duals if position.eps <= WITH_MULTIPLIERS * ROUND_OFF and position.form == form else None
-        # all iterations of the solver for a cold start on the last path, or where the user has set their number
-        last_cold = duals is None and position.path + 1 == len(self._paths)
-        unlimited = last_cold or 'max_iter' in self._options.nlp_options
-        return self._subsolves.relax(
-            form, position.w, position.eps, duals, None if unlimited else self._options.relaxation_iterations
-        )
+        form, duals = self._form(position), self._duals(position)
+        budget = None if self._unlimited(position) else self._options.relaxation_iterations
+        return self._subsolves.relax(form, position.w, position.eps, duals, budget)
+
+    def _duals(self, position):
+        """The multipliers to start from, or None."""
+        late = position.eps <= WITH_MULTIPLIERS * ROUND_OFF
+        return position.duals if late and position.form == self._form(position) and not position.goes_on else None
+
+    def _unlimited(self, position):
+        """All iterations of the solver for a cold start on the last path, or where the user has set their number."""
+        last_cold = self._duals(position) is None and position.path + 1 == len(self._paths)
+        return last_cold or 'max_iter' in self._options.nlp_options
 
     def _form(self, position):
         first, later = self._paths[position.path]
@@ -106,7 +112,13 @@ class Homotopy:
         """The position after a relaxation that failed; None after the last recovery, or with a certified incumbent."""
         self.finished = False
         self._after(self.run)
-        if not self._recoveries or self._certified() or self._hopeless():
+        if self._certified():
+            return None
+        if relaxed.stopped and not position.goes_on and not self._unlimited(position):
+            # Ipopt's own centring finds its way again where its iterations have led
+            self._subsolves.note("go on", relaxed.w)
+            return replace(position, w=relaxed.w, goes_on=True)
+        if not self._recoveries or self._hopeless():
             return None
         if self._fails_at_once(position):
             return self._begin(position.path + 1, "start again, other form", relaxed)
