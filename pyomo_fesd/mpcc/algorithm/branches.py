@@ -104,8 +104,15 @@ class Branches:
         if end is None or end.certificate.grade is not Stationarity.LIMITED:
             return
         if _is_below(end, self.run.point.f - PROGRESS * max(1.0, abs(self.run.point.f))) and self._c.widen():
-            zero = self._subsolves.sets(end.w, self._tolerances.biactive).zero
-            self.improve_from(self.certified(end.w, zero, max_iter=SECOND), True)
+            self._release(end)
+
+    def release(self):
+        """Go on from the incumbent, which guide bounds kept from descending, after these have been widened."""
+        self._release(self.run.point)
+
+    def _release(self, point):
+        zero = self._subsolves.sets(point.w, self._tolerances.biactive).zero
+        self.improve_from(self.certified(point.w, zero, max_iter=SECOND), True)
 
     def even_out(self):
         """From a certified incumbent with variables above their guide bounds, go to neighbouring branches where they are lower.

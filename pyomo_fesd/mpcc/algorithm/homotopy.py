@@ -183,6 +183,10 @@ class Homotopy:
         if self._certified() or self._hopeless():
             return None
         wider = self._stopped_by_guide_bounds() and self._c.widen()
+        if wider and self.run.point is not None:
+            self._branches.release()
+            if self._certified():
+                return None
         path = position.path + (not wider)
         if path == len(self._paths):
             return None
