@@ -34,7 +34,7 @@ class RoundSolver:
 
     def __init__(self, model: Block, wrt: ContinuousSet, keywords: dict, options: dict):
         self._model, self._wrt, self._keywords, self._options = model, wrt, keywords, dict(options)
-        self.deadline = Deadline.after(self._options.pop('time_limit', self._options.pop('timelimit', None)))
+        self.deadline = Deadline.after(self._options.pop('time_limit', None))
         self.ncp = keywords['ncp']
         self.order = 2 * self.ncp - (keywords['scheme'] == 'LAGRANGE-RADAU')
         self.optimise = any(True for _ in objectives(model))

@@ -7,6 +7,7 @@ jump.  Where these need more elements than a control stage has, the next pass ke
 import logging
 
 from pyomo_fesd.core import FesdError, moving_grids, phase
+from pyomo_fesd.finite_elements import refuse_first_mode
 from pyomo_fesd.simulation.element_solver import CUT, ElementSolver
 from pyomo_fesd.simulation.progress import Progress, accumulation
 from pyomo_fesd.simulation.step_sizes import EvenSteps, equal_steps, equilibration_is_active
@@ -37,6 +38,7 @@ class Simulation:
         """Simulate all elements, and again with equal lengths between the switches found."""
         with phase(self._timer, 'begin'):
             self._solver.find_initial_values()
+        refuse_first_mode(self._moving)
         plan = self._fit_elements()
         if equilibration_is_active(self._moving) and not self._equalise():
             self._pass(plan)

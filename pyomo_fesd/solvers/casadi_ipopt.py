@@ -104,7 +104,7 @@ class CasadiIpopt(CasadiSolver):
 
     def _solve(self, model, kwds):
         started = time.perf_counter()
-        config = self.config(value=kwds, preserve_implicit=True)
+        config = self._options(kwds)
         results = self._begin(config)
         options = _ipopts_own(config.solver_options.value())
         scaled = config.writer_config.scale_model or options.get('nlp_scaling_method') == 'user-scaling'

@@ -3,7 +3,8 @@
 The room ``simulation`` lies above this one and uses its solvers; it registers what is called here.
 
 Takes: a model, the options, and the deadline of the run.
-Leaves: the simulated values in the model; after a failure, and on ``restore``, the values of before.
+Leaves: the simulated values in the model; after a failure, on ``restore``, and where the run ends with a
+FesdError, the values of before.
 """
 
 import time
@@ -55,6 +56,13 @@ class SimulatedStart:
         finally:
             if not self.found:
                 self.restore()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, *_):
+        if kind is not None and issubclass(kind, FesdError):
+            self.restore()
 
     def _simulate(self, model, options, deadline):
         began, seconds = time.perf_counter(), None if deadline.at is None else SHARE * deadline.left()
