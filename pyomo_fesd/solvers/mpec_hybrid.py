@@ -37,6 +37,7 @@ from pyomo_fesd.solvers.persistent_model import PersistentModel, persistent_mode
 from pyomo_fesd.solvers.plugin import CasadiSolver, LegacyPlugin, deadline, review, with_structure
 from pyomo_fesd.solvers.simulated_start import SimulatedStart
 from pyomo_fesd.solvers.small_states import warn_small_states
+from pyomo_fesd.solvers.user_names import user_names
 
 NAME = 'mpec_hybrid'
 COMPILING = "it was up while the model was compiled"
@@ -127,7 +128,7 @@ class MpecHybrid(CasadiSolver):
                     setup = Setup(compiled, config, config.timer, ready.deadline, ready.cache, table.row, after)
                     solver = (Multistart if config.starts > 1 else HybridSolver)(setup)
                     record.run = solver.run
-                    fill_results(results, model, solver.solve(), set_indicators, compiled)
+                    fill_results(results, model, solver.solve(), set_indicators, compiled, names=user_names)
                     if results.solution_status is SolutionStatus.infeasible:
                         results.extra_info.reason = with_structure(results.extra_info.reason, model)
                 if start.note and not start.found and results.solution_status is not SolutionStatus.optimal:
