@@ -74,7 +74,7 @@ def test_a_clock_in_a_sub_block_with_its_own_time():
 def test_a_clone_has_its_own_clock():
     m = ramp()
     copy = m.clone()
-    assert pyomo_fesd.clock(copy).model() is copy
+    assert pyomo_fesd.clock(copy)[0].model() is copy
     for model in (copy, m):
         solve(transform(model, 6, 2))
         assert pyomo_fesd.switches(model)[0].time == pytest.approx(SWITCH, abs=1e-9)
