@@ -9,7 +9,7 @@ import logging
 from pyomo_fesd.core import FesdError, moving_grids, phase
 from pyomo_fesd.finite_elements import refuse_first_mode
 from pyomo_fesd.simulation.element_solver import CUT, ElementSolver
-from pyomo_fesd.simulation.progress import Progress, accumulation
+from pyomo_fesd.simulation.progress import Progress, TooFewElements, accumulation
 from pyomo_fesd.simulation.step_sizes import EvenSteps, equal_steps, equilibration_is_active
 
 logger = logging.getLogger('pyomo_fesd')
@@ -62,6 +62,7 @@ class Simulation:
         return self._progress.error(
             f"the elements of control stage {stage} are used up at time {self._progress.time:.6g}, after {number} switches",
             "take more elements (nfe)",
+            TooFewElements,
         )
 
     def _expected_switches(self, stage):

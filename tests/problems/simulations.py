@@ -121,7 +121,7 @@ def buck_ramp_reference(periods=3):
         while t < end - 1e-12:
             u = int(above(t, x) < 0 or (above(t, x) == 0))
             sign = -1 if u else 1
-            found = [lambda t, x: sign * above(t, x), anew]
+            found = [lambda t, x, sign=sign: sign * above(t, x), anew]
             for event in found:
                 event.terminal, event.direction = True, -1
             run = solve_ivp(rates(u), (t, end), x, events=found, rtol=1e-11, atol=1e-13)
