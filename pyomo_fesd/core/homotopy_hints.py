@@ -127,19 +127,21 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Toggle:
-    """Pairs of the place at an end that have the same side at zero, and may have the other one beyond a change.
+    """Pairs of the places at an end that have the same side at zero, and may have the other one beyond a change.
 
     Attributes
     ----------
-    sides : tuple of (ComplementarityData, bool)
-        with whether its sides are swapped
+    pairs : tuple of ComplementarityData
     first, second : NumericValue or None
         the sides at the end; None for one that may jump there
+    with_them : tuple of (ComplementarityData, bool)
+        pairs that get the same side as these, and whether their sides are swapped
     """
 
-    sides: tuple[tuple[ComplementarityData, bool], ...]
+    pairs: tuple[ComplementarityData, ...]
     first: object
     second: object
+    with_them: tuple[tuple[ComplementarityData, bool], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,11 +180,14 @@ class Arrival:
     toggles : tuple of Toggle
         pairs of one system: some of them change together
     options : tuple of Option
+    opposite : tuple of Place
+        the row on the other side of an end between two rows, from there inwards: changes come in on both sides
     """
 
     row: tuple[Place, ...]
     toggles: tuple[Toggle, ...] = ()
     options: tuple[Option, ...] = ()
+    opposite: tuple[Place, ...] = ()
 
     def gauges(self) -> list:
         """Return all expressions whose values tell which changes are at the end."""

@@ -1,19 +1,22 @@
-"""Arrivals: switches exactly at the first or the last time.
+"""Arrivals: surfaces that are reached exactly at the first or the last time, or touched at the boundary of a control stage.
 
 A trajectory that reaches a surface at the last time has not switched yet, or switches there: an element of length zero in the next
 mode belongs to the same solution.  No small step lets it grow, because the elements show the mode before the switch only; so such a
-point can be a minimum of the discretised problem only.  The same holds for a trajectory that starts on a surface.  Whether the
-element can grow with descent decides whether the solution is one.
+point can be a minimum of the discretised problem only.  The same holds for a trajectory that starts on a surface, and for one that
+a control turns back where it touches a surface: there an element on either side of the boundary belongs to the solution.  Whether
+the elements can grow with descent decides whether the solution is one.
 
 Takes: the pairs of the moving grid, and which conditions switch together.
 Leaves: an ``Arrival`` for each system and end in the block's ``HomotopyHints``; ``mpec_hybrid`` looks at it before it certifies.
-Does not apply: to conditions neither side of which is known to be continuous; to state jumps at the first time, as the trajectory
-with the jump is another one.
+Does not apply: to conditions neither side of which is known to be continuous; to state jumps at the first time and to hysteresis
+and jumps that are touched, as the trajectories with them are others.
 """
 
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+
+from pyomo.common.collections import ComponentSet
 
 from pyomo_fesd.core import Arrival, Element, MovingGrid, Option, Place, Toggle, homotopy_hints
 from pyomo_fesd.finite_elements.coincidences import switching_together
@@ -27,21 +30,16 @@ FIRST_SIDE, SECOND_SIDE = 0, 1
 
 @dataclass(frozen=True)
 class _End:
-    """One end of the time."""
+    """One end of a control stage: the direction towards it, the element beside it and the number of the boundary."""
 
     step: int
     element: Element
-    elements: int
+    boundary: int
 
     @property
     def label(self):
-        """The first or the last time."""
+        """Its time."""
         return self.element.left if self.step is TO_FIRST else self.element.right
-
-    @property
-    def boundary(self):
-        """Its number."""
-        return 0 if self.step is TO_FIRST else self.elements
 
     @property
     def inner(self):
@@ -53,12 +51,17 @@ def add_arrivals(moving: MovingGrid) -> None:
     """Add the arrivals at both ends."""
     places, arrivals, families = PairsByPlace(moving), homotopy_hints(moving.block).arrivals, _families(moving)
     elements = moving.grid.elements
-    for end in (_End(TO_FIRST, elements[0], len(elements)), _End(TO_LAST, elements[-1], len(elements))):
+    for end in (_End(TO_FIRST, elements[0], 0), _End(TO_LAST, elements[-1], len(elements))):
         row = _row(moving, places, end)
-        arrivals += [Arrival(row, toggles=toggles) for toggles in _toggles(moving, families, end) if toggles]
+        arrivals += [Arrival(row, toggles) for toggles in _toggles(moving, families, end) if toggles]
         if len(elements) > 1:
             options = [*_by_hysteresis(moving, end), *_by_jumps(moving, end)]
-            arrivals += [Arrival(row, options=tuple(some)) for some in options if some]
+            arrivals += [Arrival(row, options=some) for some in options if some]
+    for before, after in zip(elements, elements[1:]):
+        if after.opens_stage:
+            ends = _End(TO_LAST, before, before.n), _End(TO_FIRST, after, before.n)
+            row, opposite = (_row(moving, places, end) for end in ends)
+            arrivals += [Arrival(row, some, opposite=opposite) for some in _toggles(moving, families, *ends) if some]
 
 
 def _families(moving):
@@ -73,30 +76,44 @@ def _row(moving, places, end):
     """The elements of the control stage at an end, from there inwards."""
     stage = moving.grid.stages[end.element.stage]
     inner = stage[1:] if end.step is TO_FIRST else stage[-2::-1]
-    rest = ((moving.r[e.n], *places.inwards(e, end.step)) for e in inner)
-    return (Place(moving.r[end.element.n]), *(Place(r, tuple(inside), tuple(between)) for r, inside, between in rest))
+    found = [Place(moving.r[end.element.n])]
+    for e in inner:
+        inside, between = places.inwards(e, end.step)
+        if len(found) == 1:
+            # what happens at the boundary itself stays there
+            between = [(pair, None if pair.parent_component() in _happening(moving) else source) for pair, source in between]
+        found.append(Place(moving.r[e.n], tuple(inside), tuple(between)))
+    return tuple(found)
+
+
+def _happening(moving):
+    """Pairs whose first side is 0 at boundaries where nothing happens."""
+    hysteresis, jumps = moving.hysteresis, moving.state_jumps
+    return ComponentSet([*([hysteresis.leaving] if hysteresis else []), *([jumps.happens, jumps.binary] if jumps else [])])
 
 
 # conditions that elements sum up
 
 
-def _toggles(moving, families, end) -> Iterator[tuple]:
-    """For each family its pairs in the element at the end, with the values of continuous sides there."""
+def _toggles(moving, families, *ends) -> Iterator[tuple]:
+    """For each family its pairs in the elements at an end, with the values of continuous sides there."""
     for family in families:
-        yield tuple(
-            _toggle(moving, condition, end)
-            for condition in family
-            if condition.continuous[1] and end.label in condition.sides and condition.points(end.element)
-        )
+        yield tuple(_toggle(moving, condition, ends) for condition in family if _is_seen(condition, ends))
 
 
-def _toggle(moving, condition, end):
-    sides = condition.sides[end.label]
-    pairs = [(pair, False) for (name, n, *_), pair in moving.pairs.items() if (name, n) == (condition.name, end.element.n)]
-    if end.step is TO_FIRST:
-        # the condition at the first time itself belongs to the mode of the first element
-        pairs.append((condition.conditions[end.label], condition.swapped))
-    return Toggle(tuple(pairs), *(side if known else None for side, known in zip(sides, condition.continuous)))
+def _is_seen(condition, ends):
+    """Whether a condition has a value at an end that all its elements share."""
+    if not condition.continuous[1] or ends[0].label not in condition.sides:
+        return False
+    return all(condition.points(end.element) for end in ends) and not (len(ends) > 1 and any(condition.jumps_with_controls))
+
+
+def _toggle(moving, condition, ends):
+    label, elements = ends[0].label, [end.element.n for end in ends]
+    pairs = tuple(pair for (name, n, *_), pair in moving.pairs.items() if name == condition.name and n in elements)
+    # the condition at the first time itself belongs to the mode of the first element
+    first = ((condition.conditions[label], condition.swapped),) if label == moving.wrt.first() else ()
+    return Toggle(pairs, *(side if known else None for side, known in zip(condition.sides[label], condition.continuous)), first)
 
 
 # modes with hysteresis

@@ -14,6 +14,7 @@ from pyomo_fesd.mpcc.subproblems import G_ZERO, H_ZERO
 
 #: Pairs of one family that are combined in all ways; of more only each one, and all.
 FEW = 3
+OTHER = {G_ZERO: H_ZERO, H_ZERO: G_ZERO}
 NONE = np.zeros(0, dtype=int)
 
 
@@ -68,10 +69,10 @@ def branches(c, w, sets, tolerance) -> Iterator[Entered | None]:
     for arrival in c.arrivals:
         changes = [*_toggled(arrival, sets, at_end), *_optional(arrival, sets, at_end)]
         if changes:
-            by_row.setdefault(id(arrival.row), (arrival.row, []))[1].append(changes)
-    for row, present in by_row.values():
+            by_row.setdefault(id(arrival.rows), (arrival.rows, []))[1].append(changes)
+    for rows, present in by_row.values():
         for sequence in _sequences(present):
-            yield _entered(row, sequence, sets, w)
+            yield _entered(rows, sequence, sets, w)
 
 
 def _sequences(present) -> Iterator[tuple]:
@@ -85,13 +86,18 @@ def _sequences(present) -> Iterator[tuple]:
 
 def _toggled(arrival, sets, at_end) -> Iterator[_Change]:
     """The changes of the pairs of one system of which at least one has arrived at its surface."""
-    toggles = [t for t in arrival.toggles if not (sets.gamma | sets.open)[t.pairs[0]]]
+    toggles = [t for t in arrival.toggles if _agree(t.pairs, sets)]
     on = [sets.zero[t.pairs[0]] == H_ZERO for t in toggles]
     arrived = [t for t, is_on in zip(toggles, on) if _holds(t.first if is_on else t.second, at_end)]
     with_them = [t for t, is_on in zip(toggles, on) if is_on and t.first is None]
     for some in _some(arrived):
         for rest in [(), *_some(with_them)]:
             yield _flipped([*some, *rest], sets)
+
+
+def _agree(pairs, sets):
+    """Whether pairs have the same zero side for certain."""
+    return not (sets.gamma | sets.open)[pairs].any() and len(set(sets.zero[pairs])) == 1
 
 
 def _holds(gauge, at_end):
@@ -105,14 +111,13 @@ def _some(toggles):
 
 
 def _flipped(toggles, sets):
-    pairs = np.concatenate([t.pairs for t in toggles])
-    new = np.concatenate([np.where(t.swapped, *_sides(sets.zero[t.pairs[0]])) for t in toggles])
-    return _Change(pairs, new, NONE)
-
-
-def _sides(before):
-    """The sides that are zero afterwards: of pairs in the other order, of the others."""
-    return (G_ZERO, H_ZERO) if before == G_ZERO else (H_ZERO, G_ZERO)
+    pairs, sides = [], []
+    for t in toggles:
+        before = sets.zero[t.pairs[0]]
+        after = OTHER[before]
+        pairs += [t.pairs, t.with_them]
+        sides += [np.full(len(t.pairs), after), np.where(t.swapped, before, after)]
+    return _Change(np.concatenate(pairs), np.concatenate(sides), NONE)
 
 
 def _optional(arrival, sets, at_end) -> Iterator[_Change]:
@@ -121,17 +126,18 @@ def _optional(arrival, sets, at_end) -> Iterator[_Change]:
             yield _Change(option.pairs, option.sides, option.either)
 
 
-def _entered(row, sequence, sets, w):
+def _entered(rows, sequence, sets, w):
     """The branch after changes have come in one after the other, the last one next to the end."""
     zero, start, either = sets.zero, w, []
     for change in sequence:
-        moved = _moved_inwards(row, zero, start, sets.gamma | sets.open)
-        if moved is None:
-            return None
-        zero, start = moved
+        for row in rows:
+            moved = _moved_inwards(row, zero, start, sets.gamma | sets.open)
+            if moved is None:
+                return None
+            zero, start = moved
         zero[change.pairs] = change.sides
         either.append(change.either)
-    extents = [place.extent for place in row[: len(sequence)]]
+    extents = [place.extent for row in rows for place in row[: len(sequence)]]
     return None if None in extents else Entered(np.array(extents), zero, start, np.concatenate(either))
 
 

@@ -4,6 +4,8 @@ Takes: hints, with the positions of pairs and of variables by the id of a compon
 Leaves: the same by positions.
 """
 
+from itertools import count
+
 import numpy as np
 
 from pyomo_fesd.mpcc.compile.mpcc_functions import ArrivalIndices, MoveIndices, OptionIndices, PlaceIndices, ToggleIndices
@@ -11,18 +13,13 @@ from pyomo_fesd.mpcc.compile.mpcc_functions import ArrivalIndices, MoveIndices, 
 
 def arrival_indices(arrivals, pairs, columns) -> list[ArrivalIndices]:
     """Return the arrivals by positions; gauges are numbered in the order of ``Arrival.gauges``."""
-    rows, found, number = {}, [], 0
+    rows, found, numbers = {}, [], count()
     for arrival in arrivals:
         if id(arrival.row) not in rows:
-            rows[id(arrival.row)] = tuple(_place(place, pairs, columns) for place in arrival.row)
-        toggles, options = [], []
-        for toggle in arrival.toggles:
-            numbers = [None if side is None else number + (side is toggle.second and toggle.first is not None) for side in (toggle.first, toggle.second)]
-            number += sum(1 for k in numbers if k is not None)
-            toggles.append(_toggle(toggle, numbers, pairs))
-        for option in arrival.options:
-            options.append(_option(option, number, pairs))
-            number += len(option.gauges)
+            both = (arrival.row, arrival.opposite) if arrival.opposite else (arrival.row,)
+            rows[id(arrival.row)] = tuple(tuple(_place(place, pairs, columns) for place in row) for row in both)
+        toggles = [_toggle(toggle, numbers, pairs) for toggle in arrival.toggles]
+        options = [_option(option, numbers, pairs) for option in arrival.options]
         found.append(ArrivalIndices(rows[id(arrival.row)], tuple(t for t in toggles if t.pairs.size), tuple(options)))
     return found
 
@@ -33,20 +30,19 @@ def _place(place, pairs, columns):
 
 
 def _toggle(toggle, numbers, pairs):
-    found = [(k, swapped) for pair, swapped in toggle.sides for k in pairs.get(id(pair), ())]
-    positions, swapped = np.array(found, dtype=int).reshape(-1, 2).T
-    return ToggleIndices(positions, swapped.astype(bool), *numbers)
+    first, second = (None if side is None else next(numbers) for side in (toggle.first, toggle.second))
+    return ToggleIndices(positions_of(toggle.pairs, pairs), first, second, *_with_numbers(toggle.with_them, pairs))
 
 
-def _option(option, number, pairs):
-    gauges = np.arange(number, number + len(option.gauges))
+def _option(option, numbers, pairs):
+    gauges = np.array([next(numbers) for _ in option.gauges], dtype=int)
     return OptionIndices(
-        gauges, *_with_sides(option.requires, pairs), *_with_sides(option.sides, pairs), positions_of(option.either, pairs)
+        gauges, *_with_numbers(option.requires, pairs), *_with_numbers(option.sides, pairs), positions_of(option.either, pairs)
     )
 
 
-def _with_sides(sides, pairs):
-    found = [(k, side) for pair, side in sides for k in pairs.get(id(pair), ())]
+def _with_numbers(couples, pairs):
+    found = [(k, number) for pair, number in couples for k in pairs.get(id(pair), ())]
     return tuple(np.array(found, dtype=int).reshape(-1, 2).T)
 
 

@@ -139,12 +139,13 @@ class PlaceIndices:
 
 @dataclass(frozen=True, eq=False)
 class ToggleIndices:
-    """A ``Toggle`` by positions of pairs and gauges; ``swapped`` belongs to ``pairs``, ``first`` and ``second`` may be None."""
+    """A ``Toggle`` by positions of pairs and gauges; ``first`` and ``second`` may be None; ``swapped`` belongs to ``with_them``."""
 
     pairs: np.ndarray
-    swapped: np.ndarray
     first: int | None
     second: int | None
+    with_them: np.ndarray
+    swapped: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +162,9 @@ class OptionIndices:
 
 @dataclass(frozen=True, eq=False)
 class ArrivalIndices:
-    """An ``Arrival`` by positions; arrivals at one end share their ``row``, a tuple of PlaceIndices."""
+    """An ``Arrival`` by positions; arrivals at one end share their ``rows``, one or two tuples of PlaceIndices."""
 
-    row: tuple
+    rows: tuple
     toggles: tuple
     options: tuple
 
