@@ -71,6 +71,9 @@ class Coincidences:
         tried, outcome = set(), SETTLED
         if self._is_flat(point):
             return SETTLED
+        better = self._branches.without_short(point)
+        if better is not None:
+            return better
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)
         for ways in self._orders(point.w, sets):
             key = tuple((way.extents.tobytes(), way.zero.tobytes()) for way in ways)
