@@ -50,10 +50,10 @@ class _End:
 def add_arrivals(moving: MovingGrid) -> None:
     """Add the arrivals at both ends."""
     places, arrivals, families = PairsByPlace(moving), homotopy_hints(moving.block).arrivals, _families(moving)
-    elements = moving.grid.elements
+    elements, pairs = moving.grid.elements, _pairs_of_elements(moving)
     for end in (_End(TO_FIRST, elements[0], 0), _End(TO_LAST, elements[-1], len(elements))):
         row = _row(moving, places, end)
-        arrivals += [Arrival(row, toggles) for toggles in _toggles(moving, families, end) if toggles]
+        arrivals += [Arrival(row, toggles) for toggles in _toggles(families, pairs, end) if toggles]
         if len(elements) > 1:
             options = [*_by_hysteresis(moving, end), *_by_jumps(moving, end)]
             arrivals += [Arrival(row, options=some) for some in options if some]
@@ -61,7 +61,7 @@ def add_arrivals(moving: MovingGrid) -> None:
         if after.opens_stage:
             ends = _End(TO_LAST, before, before.n), _End(TO_FIRST, after, before.n)
             row, opposite = (_row(moving, places, end) for end in ends)
-            arrivals += [Arrival(row, some, opposite=opposite) for some in _toggles(moving, families, *ends) if some]
+            arrivals += [Arrival(row, some, opposite=opposite) for some in _toggles(families, pairs, *ends) if some]
 
 
 def _families(moving):
@@ -75,13 +75,13 @@ def _families(moving):
 def _row(moving, places, end):
     """The elements of the control stage at an end, from there inwards."""
     stage = moving.grid.stages[end.element.stage]
-    inner = stage[1:] if end.step is TO_FIRST else stage[-2::-1]
+    inner, happening = stage[1:] if end.step is TO_FIRST else stage[-2::-1], _happening(moving)
     found = [Place(moving.r[end.element.n])]
     for e in inner:
         inside, between = places.inwards(e, end.step)
         if len(found) == 1:
             # what happens at the boundary itself stays there
-            between = [(pair, None if pair.parent_component() in _happening(moving) else source) for pair, source in between]
+            between = [(pair, None if pair.parent_component() in happening else source) for pair, source in between]
         found.append(Place(moving.r[e.n], tuple(inside), tuple(between)))
     return tuple(found)
 
@@ -95,10 +95,18 @@ def _happening(moving):
 # conditions that elements sum up
 
 
-def _toggles(moving, families, *ends) -> Iterator[tuple]:
+def _pairs_of_elements(moving):
+    """The pairs by condition and element."""
+    found = defaultdict(list)
+    for (name, n, *_), pair in moving.pairs.items():
+        found[name, n].append(pair)
+    return found
+
+
+def _toggles(families, pairs, *ends) -> Iterator[tuple]:
     """For each family its pairs in the elements at an end, with the values of continuous sides there."""
     for family in families:
-        yield tuple(_toggle(moving, condition, ends) for condition in family if _is_seen(condition, ends))
+        yield tuple(_toggle(condition, pairs, ends) for condition in family if _is_seen(condition, ends))
 
 
 def _is_seen(condition, ends):
@@ -108,12 +116,13 @@ def _is_seen(condition, ends):
     return all(condition.points(end.element) for end in ends) and not (len(ends) > 1 and any(condition.jumps_with_controls))
 
 
-def _toggle(moving, condition, ends):
-    label, elements = ends[0].label, [end.element.n for end in ends]
-    pairs = tuple(pair for (name, n, *_), pair in moving.pairs.items() if name == condition.name and n in elements)
+def _toggle(condition, pairs, ends):
+    label = ends[0].label
+    of_elements = tuple(pair for end in ends for pair in pairs[condition.name, end.element.n])
     # the condition at the first time itself belongs to the mode of the first element
-    first = ((condition.conditions[label], condition.swapped),) if label == moving.wrt.first() else ()
-    return Toggle(pairs, *(side if known else None for side, known in zip(condition.sides[label], condition.continuous)), first)
+    first = ((condition.conditions[label], condition.swapped),) if ends[0].boundary == 0 else ()
+    sides = zip(condition.sides[label], condition.continuous)
+    return Toggle(of_elements, *(side if known else None for side, known in sides), first)
 
 
 # modes with hysteresis

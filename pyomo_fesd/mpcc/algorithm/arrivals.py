@@ -12,7 +12,7 @@ import numpy as np
 
 from pyomo_fesd.mpcc.subproblems import G_ZERO, H_ZERO
 
-#: Pairs of one family that are combined in all ways; of more only each one, and all.
+#: Pairs of one family, or systems, that are combined in all ways; of more only each one, and all.
 FEW = 3
 OTHER = {G_ZERO: H_ZERO, H_ZERO: G_ZERO}
 NONE = np.zeros(0, dtype=int)
@@ -76,9 +76,12 @@ def branches(c, w, sets, tolerance) -> Iterator[Entered | None]:
 
 
 def _sequences(present) -> Iterator[tuple]:
-    """Each change alone, those of all systems together, and those of two systems one after the other."""
+    """Each change alone, those of all systems together, and those of two systems one after the other; of many systems without the
+    last."""
     yield from ((change,) for changes in present for change in changes)
-    if len(present) > 1:
+    if len(present) > FEW:
+        yield from ((sum(some[1:], some[0]),) for some in zip(*present))
+    elif len(present) > 1:
         yield from ((sum(some[1:], some[0]),) for some in product(*present))
         for first, second in permutations(present, 2):
             yield from product(first, second)
