@@ -27,13 +27,17 @@ from pyomo_fesd.core.grid import (
     share_elements,
 )
 from pyomo_fesd.core.homotopy_hints import (
+    Arrival,
     BranchConstraint,
     Change,
     Coincidence,
     Follower,
     HomotopyHints,
     NeighbourBranch,
+    Option,
     Penalty,
+    Place,
+    Toggle,
     all_hints,
     homotopy_hints,
 )

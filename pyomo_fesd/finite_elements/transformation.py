@@ -30,6 +30,7 @@ from pyomo_fesd.core import (
     signals,
     write_at_further_times,
 )
+from pyomo_fesd.finite_elements.arrivals import add_arrivals
 from pyomo_fesd.finite_elements.coincidences import add_coincidences
 from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
 from pyomo_fesd.finite_elements.controls import check_controls, fix_given, hold_controls
@@ -271,3 +272,4 @@ def _add_switching(moving, switching, complementarities, continuity, config):
         add_sliding_exits(moving)
     add_neighbour_branches(moving)
     add_coincidences(moving)
+    add_arrivals(moving)

@@ -17,6 +17,8 @@ from pyomo_fesd.mpcc.algorithm.subsolves import Subsolves
 
 #: Other starts of a problem with few pairs, before it is called infeasible.
 RESTARTS = 3
+#: Times that a better order of changes is made even again.
+ROUNDS = 3
 
 
 def few_pairs(compiled) -> bool:
@@ -80,14 +82,22 @@ class HybridSolver:
         if self.run.point is None:
             self._search_everywhere()
         self._c.widen()
-        self._branches.even_out()
-        self._coincidences.settle()
+        self._settle()
         point = self.run.point
         if point is None:
             return Outcome.INFEASIBLE
         if not point.certificate.certified:
             return Outcome.FEASIBLE
         return Outcome.CERTIFIED if self._c.has_objective else Outcome.SOLVED
+
+    def _settle(self):
+        """Go to more even solutions and try all orders of changes, until neither leads on."""
+        for _ in range(ROUNDS):
+            self._branches.even_out()
+            before = self.run.point
+            self._coincidences.settle()
+            if self.run.point is before:
+                return
 
     def _starts_at_a_solution(self):
         """Whether there is no objective and the start is feasible already."""

@@ -10,12 +10,12 @@ import numpy as np
 from pyomo.core import maximize
 from scipy import sparse
 
+from pyomo_fesd.mpcc.compile.arrival_indices import arrival_indices, both_positions, moves, positions_of
 from pyomo_fesd.mpcc.compile.model_values import ModelValues, start_values, stated_bounds
 from pyomo_fesd.mpcc.compile.mpcc_functions import (
     ChangeIndices,
     CoincidenceIndices,
     FollowerIndices,
-    MoveIndices,
     MpccData,
     MpccFunctions,
     NeighbourIndices,
@@ -92,10 +92,13 @@ def _assembled(problem, entries, nl, symbols, factors, index, by_starts, units=N
         tentative=np.array([d.tentative for d in problem.decisions], dtype=bool),
         neighbours=_neighbours(problem.hints.neighbour_branches, *positions, s_x),
         coincidences=[_coincidence(hint, *positions) for hint in problem.hints.coincidences],
+        arrivals=arrival_indices(problem.hints.arrivals, *positions),
         followers=_followers(problem.hints.followers, positions[0]),
         **values.read(),
     )
-    outputs = _outputs(index, f, rows, stack, S, scale)
+    gauges = take(stack, index.gauges)
+    gauges = gauges * _factors_of_expressions(gauges, (w, p), (start * s_x, at[1]), np.ones(gauges.numel()))
+    outputs = _outputs(index, f, rows, stack, S, scale, gauges)
     return MpccFunctions(w, p, outputs, data, variables, constraints, conditions, problem.decisions, values)
 
 
@@ -159,14 +162,14 @@ def _are_sides(sides, index):
     return among[index.free]
 
 
-def _outputs(index, f, rows, stack, S, scale):
+def _outputs(index, f, rows, stack, S, scale, gauges):
     """The functions of the MPCC, in the order of ``MpccFunctions.NAMES``."""
     S, q = S * scale.sides, S.numel() // 2
     # term by term: the sum's order is that of the terms
     penalty = sum((stack[int(k)] for k in index.penalty), ca.SX(0))
     eta, equal = take(stack, index.eta), take(stack, index.equal)
     f = _without(f, scale.offset)
-    return [f * scale.f, penalty * scale.f, rows * scale.g, S[:q], S[q:], eta, equal]
+    return [f * scale.f, penalty * scale.f, rows * scale.g, S[:q], S[q:], eta, equal, gauges]
 
 
 def _without(f, offset):
@@ -213,14 +216,14 @@ def _followers(followers, pairs):
 
 def _neighbour(branch, pairs, columns, s_x):
     """One of them; ``pairs`` and ``columns`` are positions by the id of a component, which need not have any."""
-    targets, sources = _both_positions(branch.takes_over, pairs)
+    targets, sources = both_positions(branch.takes_over, pairs)
     starts = {columns[id(v)][0]: start for v, start in branch.starts if id(v) in columns}
     at = np.array(list(starts), dtype=int)
     return NeighbourIndices(
         targets,
         sources,
-        ended=_positions(branch.first_side_zero, pairs),
-        short=_positions(branch.if_at_lower_bound, columns),
+        ended=positions_of(branch.first_side_zero, pairs),
+        short=positions_of(branch.if_at_lower_bound, columns),
         starts=at,
         at=np.array(list(starts.values()), dtype=float) * s_x[at],
     )
@@ -228,23 +231,8 @@ def _neighbour(branch, pairs, columns, s_x):
 
 def _coincidence(hint, pairs, columns):
     changes = tuple(
-        ChangeIndices(*_both_positions(change.differing, pairs), _move(change.later, pairs), _move(change.earlier, pairs))
+        ChangeIndices(*both_positions(change.differing, pairs), moves(change.later, pairs), moves(change.earlier, pairs))
         for change in hint.changes
     )
     later, earlier = (None if v is None or id(v) not in columns else columns[id(v)][0] for v in (hint.later, hint.earlier))
     return CoincidenceIndices(changes, later, earlier, hint.fixed)
-
-
-def _move(moved, pairs):
-    taken = _both_positions([(pair, source) for pair, source in moved if source is not None], pairs)
-    return MoveIndices(*taken, _positions([pair for pair, source in moved if source is None], pairs))
-
-
-def _both_positions(hints, pairs):
-    """Positions of the first and of the second components of some couples, where both have any."""
-    found = [both for couple in hints for both in zip(*(pairs.get(id(component), ()) for component in couple))]
-    return tuple(np.array(found, dtype=int).reshape(-1, 2).T)
-
-
-def _positions(components, positions):
-    return np.array([k for c in components for k in positions.get(id(c), ())], dtype=int)
