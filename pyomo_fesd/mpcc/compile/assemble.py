@@ -25,12 +25,11 @@ from pyomo_fesd.mpcc.compile.mpcc_functions import (
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.nl_index import NlIndex
 from pyomo_fesd.mpcc.compile.parameters import parameter_values
+from pyomo_fesd.mpcc.compile.round_off import EXACT, parameter_terms
 from pyomo_fesd.mpcc.compile.scaling import Scale, side_factors
 from pyomo_fesd.mpcc.compile.sizes import row_factors, variable_factors, without_small
 
 UNBOUNDED = (-np.inf, np.inf)
-#: Constants of linearised rows below this part of their terms are rounding errors.
-EXACT = 1e-13
 #: Variables of a nonlinear model that may be scaled by coefficients.
 SMALL = 100
 #: By what variables and rows without a factor of the user are scaled: see ``compile_mpcc``.
@@ -105,7 +104,8 @@ def _factors_by_size(nl, index, sides, at, variables, given_x, given_g, hints):
     all_rows = ca.vertcat(rows, take(stack, sides))
     function = ca.Function('rows', [w, p], [all_rows, ca.jacobian(all_rows, w)])
     bounds = np.concatenate([nl.lbg[index.model_rows], np.zeros(len(sides))])
-    J, constants = _linearised(function, without_small(at[0]), at[1], bounds)
+    w0 = without_small(at[0])
+    J, constants = _linearised(function, w0, at[1], bounds, parameter_terms(all_rows, w, p, w0, at[1]))
     columns = {id(v): j for j, v in enumerate(variables)}
     alike = [[columns[id(v)] for v in group if id(v) in columns] for group in hints.alike]
     s_x = variable_factors(J, constants, at[0], stated_bounds(variables), given_x, [group for group in alike if group])
@@ -113,13 +113,16 @@ def _factors_by_size(nl, index, sides, at, variables, given_x, given_g, hints):
     return s_x, row_factors(J @ sparse.diags(1 / s_x), given_g)
 
 
-def _linearised(function, w, p, bounds):
-    """Jacobian of rows and their distances from ``bounds`` where the variables are 0, without rounding errors."""
+def _linearised(function, w, p, bounds, others):
+    """Jacobian of rows and their distances from ``bounds`` where the variables are 0, without rounding errors.
+
+    ``others`` are the sizes of terms without variables.
+    """
     values, J = function(w, p)
     J = csr(J)
     found = np.asarray(values, dtype=float).ravel() - J @ w
     constants = found - np.where(np.isfinite(bounds), bounds, 0.0)
-    exact = np.abs(constants) > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
+    exact = np.abs(constants) > EXACT * (abs(J) @ np.abs(w) + np.abs(found) + others)
     return J, np.where(exact, constants, 0.0)
 
 
