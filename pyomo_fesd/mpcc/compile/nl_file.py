@@ -34,6 +34,8 @@ class NlModel:
     function : casadi Function (x) -> f, g, on SX
     lbg, ubg : arrays (m)
         constants of linear rows are part of their bounds, without round-off
+    cancelling : array (m)
+        sizes of the terms of fixed values that cancel in small constants, else 0
     """
 
     variables: list
@@ -41,6 +43,7 @@ class NlModel:
     function: object
     lbg: np.ndarray
     ubg: np.ndarray
+    cancelling: np.ndarray
 
 
 def folder_for(folder):
