@@ -7,7 +7,8 @@ The transformation reads the switched systems that other transformations recorde
 - ``expansion``, ``collocation``: pyomo.dae's discretisation, also of Disjuncts
 - ``lengths``, ``free_time``, ``quadrature``, ``controls``: time on moving elements
 - ``time_complementarities``, ``mixed_complementarity``, ``continuity``, ``algebraic_graph``: conditions and their continuity
-- ``cross_complementarity``, ``state_jumps``, ``hysteresis``, ``right_limits``, ``mode_limits``: the laws of switching
+- ``cross_complementarity``, ``state_jumps``, ``hysteresis``, ``right_limits``, ``mode_limits``, ``relations``: the laws of
+  switching
 - ``equilibration``, ``sliding_exit``, ``neighbour_branches``, ``coincidences``: the lengths, and hints for the homotopy
 - ``given_inputs``, ``explicit_time``, ``untaken_kinks``, ``spatial_sets``: inputs, warnings and refusals
 """

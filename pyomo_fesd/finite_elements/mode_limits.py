@@ -16,18 +16,18 @@ Leaves: these with ``starts``, at every element or at those that open a control 
 Does not apply: where the equations do not determine the argument; a warning then says that switches may go unnoticed.
 """
 
-from collections import Counter, defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
 
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint, Set, Var
-from pyomo.core.expr.visitor import identify_variables, replace_expressions
+from pyomo.core.expr.visitor import replace_expressions
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import MovingGrid, Pair, TimeIndex, all_switched_systems, derivatives, is_discretisation_equation
+from pyomo_fesd.core import MovingGrid, Pair, TimeIndex, all_switched_systems, derivatives
 from pyomo_fesd.finite_elements.algebraic_graph import rule_of
 from pyomo_fesd.finite_elements.continuity import Continuity
+from pyomo_fesd.finite_elements.relations import Relations, variables_in, variables_in_sides
 from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
 
 
@@ -67,7 +67,9 @@ class _ModeLimits:
         self._states = ComponentSet(d.get_state_var() for d in derivatives(model, moving.wrt))
         self._names = self._names_of(continuity.across)
         self._selectors = self._read_selectors(model, conditions)
-        self._relations = self._read_relations(model)
+        self._ruled = ComponentSet(rule for rule in self._rules.values() if rule.ctype is Constraint)
+        labels = {e.points[0] for e in moving.grid.elements}
+        self._relations = Relations(model, self._times, labels, self._rules, self._is_algebraic)
         self._copies = {e.n: ComponentMap() for e in moving.grid.elements}
         moving.limits = moving.block.limits = block = Block()
         block.place = Set(dimen=1)
@@ -89,28 +91,36 @@ class _ModeLimits:
 
     def _swap(self, element, pair):
         """id of each variable of a pair at the first point -> its value at the left boundary; None if that is not determined."""
-        if pair is None:
+        label = element.points[0]
+        wanted = [] if pair is None else [v for v in variables_in_sides(pair) if self._is_algebraic(v, label)]
+        tied, relations = self._relations.closure(label, wanted)
+        copied, equations = ComponentSet([*tied, *wanted]), [r.equation for r in relations if r.equation is not None]
+        if pair is None or not self._determine(equations, copied):
             return None
-        copied, equations = self._closure(element.points[0], [v for side in pair for v in _variables(side)])
-        equations = [e for e in equations if e is not None]
-        # parts are determined by their pairs: p and n, lam and mu with the equations of their rule
-        ruled = ComponentSet(rule for rule in self._rules.values() if rule.ctype is Constraint)
-        own = sum(1 for e in equations if e.parent_component() not in ruled)
-        if own != sum(1 for v in copied if rule_of(v, self._rules) is None):
-            return None
-        copies, block = self._copies[element.n], self._moving.limits
-        new = ComponentSet(v for v in copied if v not in copies)
-        for v in new:
-            copies[v] = copy = block.copy[element.n, self._place(element, block.copy)]
-            copy.bounds, copy.value = (v.lower, v.upper), v.value
-        relevant = ComponentSet(
-            [*copied, *(v for e in equations for v in _variables(e.expr)), *(v for side in pair for v in _variables(side))]
-        )
+        new = self._copy(element, copied)
+        relevant = ComponentSet([*copied, *variables_in_sides(e.expr for e in equations), *variables_in_sides(pair)])
         swap = {id(v): self._at_left(element, v) for v in relevant}
-        for equation in equations:
-            if any(v in new for v in _variables(equation.expr)):
-                block.copied.add((element.n, self._place(element, block.copied)), replace_expressions(equation.expr, swap))
+        self._copy_equations(element, [e for e in equations if any(v in new for v in variables_in(e.expr))], swap)
         return swap
+
+    def _determine(self, equations, variables):
+        """Whether the equations are as many as the variables; parts p and n, lam and mu come with the equations of their rule."""
+        own = sum(1 for e in equations if e.parent_component() not in self._ruled)
+        return own == sum(1 for v in variables if rule_of(v, self._rules) is None)
+
+    def _copy(self, element, variables):
+        """Add copies of those variables that have none in this element; returns these."""
+        copies, component = self._copies[element.n], self._moving.limits.copy
+        new = ComponentSet(v for v in variables if v not in copies)
+        for v in new:
+            copies[v] = copy = component[element.n, self._place(element, component)]
+            copy.bounds, copy.value = (v.lower, v.upper), v.value
+        return new
+
+    def _copy_equations(self, element, equations, swap):
+        component = self._moving.limits.copied
+        for equation in equations:
+            component.add((element.n, self._place(element, component)), replace_expressions(equation.expr, swap))
 
     def _at_left(self, element, v):
         """The value of a variable right of the left boundary."""
@@ -148,71 +158,13 @@ class _ModeLimits:
             found.update(v.values() if v.is_indexed() else [v])
         for condition in conditions:
             if condition.continuous == (False, True):
-                found.update(v for pair in condition.sides.values() for v in _variables(pair[0]))
+                found.update(v for pair in condition.sides.values() for v in variables_in(pair[0]))
         return found
-
-    # which variables and equations belong to an argument
-
-    def _read_relations(self, model):
-        """By label of a first point, by variable: ``(equation or None for the pair of a positive part, its variables)``."""
-        labels, found = {e.points[0] for e in self._moving.grid.elements}, defaultdict(ComponentMap)
-        for equation in model.component_data_objects(Constraint, active=True, descend_into=Block):
-            label = self._times.time(equation)
-            if label in labels and equation.equality and not is_discretisation_equation(equation):
-                self._add(found[label], label, equation, _variables(equation.expr))
-        for s, rule in self._rules.items():
-            if rule.ctype is Complementarity:
-                for v in s.values():
-                    label = self._times.time(v)
-                    if label in labels:
-                        self._add(found[label], label, None, [u for side in rule[v.index()]._args for u in _variables(side)])
-        return found
-
-    def _add(self, at_label, label, equation, variables):
-        relation = (equation, [v for v in ComponentSet(variables) if self._is_algebraic(v, label)])
-        for v in relation[1]:
-            at_label.setdefault(v, []).append(relation)
 
     def _is_algebraic(self, v, label):
         return self._times.time(v) == label and not self._is_constant(v) and not self._is_continuous(v)
-
-    def _is_part(self, v):
-        """Whether a pair determines the variable: s, p and n, lam and mu."""
-        return rule_of(v, self._rules) is not None
-
-    def _closure(self, label, wanted):
-        """The algebraic variables that ``wanted`` depend on, and the equations between them."""
-        at_label, wanted = self._relations[label], ComponentSet(v for v in wanted if self._is_algebraic(v, label))
-        found, relations, waiting = ComponentSet(), {}, list(wanted)
-        while waiting:
-            v = waiting.pop()
-            if v not in found:
-                found.add(v)
-                for relation in at_label.get(v, ()):
-                    relations[id(relation)] = relation
-                    waiting += relation[1]
-        kept = self._without_results(list(relations.values()), wanted)
-        left = ComponentSet(v for _, variables in kept for v in variables)
-        return [v for v in found if v in left or v in wanted], [equation for equation, _ in kept]
-
-    def _without_results(self, relations, wanted):
-        """Remove each equation that only defines a variable which nothing else contains."""
-        while True:
-            number = Counter(id(v) for _, variables in relations for v in variables)
-            kept = [(e, variables) for e, variables in relations if not self._only_defines(e, variables, number, wanted)]
-            if len(kept) == len(relations):
-                return kept
-            relations = kept
-
-    def _only_defines(self, equation, variables, number, wanted):
-        results = [v for v in variables if number[id(v)] == 1 and v not in wanted]
-        return any(equation is None or not self._is_part(v) for v in results)
 
     def _place(self, element, component):
         place = sum(1 for n, _ in component if n == element.n) + 1
         self._moving.limits.place.add(place)
         return place
-
-
-def _variables(expr):
-    return list(identify_variables(expr, include_fixed=True)) if hasattr(expr, 'is_expression_type') else []

@@ -13,21 +13,17 @@ Leaves: the time complementarities with ``starts``; ``copy`` (Vars) and ``copied
 Does not apply: to variables that are continuous only by the user's word.
 """
 
-from collections import Counter, defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
 
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, Constraint
-from pyomo.core.base.constraint import ConstraintData
-from pyomo.core.expr.visitor import identify_variables, replace_expressions
-from pyomo.mpec import Complementarity
+from pyomo.core.expr.visitor import replace_expressions
 
-from pyomo_fesd.core import Element, MovingGrid, Pair, TimeIndex, derivatives, is_discretisation_equation
+from pyomo_fesd.core import Element, MovingGrid, Pair, TimeIndex, derivatives
 from pyomo_fesd.finite_elements.continuity import Continuity
 from pyomo_fesd.finite_elements.explicit_time import differ
+from pyomo_fesd.finite_elements.relations import Relations, variables_in, variables_in_sides
 from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
 
 
@@ -53,7 +49,8 @@ class RightLimits:
     @cached_property
     def _relations(self):
         labels = {e.right for e in self._moving.grid.elements[:-1]}
-        return _Relations(self._moving.block.model(), self._times, labels, self._continuous)
+        known, rules = self._continuous, self._continuous.continuity.rules
+        return Relations(self._moving.block.model(), self._times, labels, rules, known.is_algebraic, known.inside)
 
     def with_starts(self, condition: TimeComplementarity) -> TimeComplementarity:
         """Return a time complementarity with the pairs that elements start from where the sides on their left may differ."""
@@ -63,7 +60,7 @@ class RightLimits:
         for before, element in zip(self._moving.grid.elements, self._moving.grid.elements[1:]):
             pair = condition.sides.get(before.right)
             if pair is not None and not (element.opens_stage and any(condition.jumps_with_controls)):
-                swap = self._swap(before, _variables_of_sides(pair))
+                swap = self._swap(before, variables_in_sides(pair))
                 found |= {element.n: Pair(*(replace_expressions(side, swap) for side in pair))} if swap else {}
         return replace(condition, starts=found)
 
@@ -78,16 +75,16 @@ class RightLimits:
         right = self._of_next_stage(before, functions[element.points[0]]) if element.opens_stage else left
         same = not element.opens_stage or self._same(left, right)
         right = left if same else right
-        swap = self._swap(before, _variables(right)) if self._states else {}
+        swap = self._swap(before, variables_in(right)) if self._states else {}
         return None if same and not swap else replace_expressions(right, swap)
 
     def _same(self, left, right):
         """Whether two expressions contain no controls of a control stage, and have the same numbers."""
-        return all(self._continuous.across(v) for v in _variables(left)) and not differ([lambda: left, lambda: right])
+        return all(self._continuous.across(v) for v in variables_in(left)) and not differ([lambda: left, lambda: right])
 
     def _of_next_stage(self, before, expr):
         """An expression of the next element at its left boundary: controls keep their new values."""
-        continuous = [v for v in _variables(expr) if self._times.time(v) is not None and self._continuous.across(v)]
+        continuous = [v for v in variables_in(expr) if self._times.time(v) is not None and self._continuous.across(v)]
         return replace_expressions(expr, {id(v): self._times.at(v, before.right) for v in continuous})
 
     def _swap(self, before, variables):
@@ -138,79 +135,9 @@ class _Continuous:
         """At the boundaries of control stages too."""
         return self._in(v, self.continuity.across)
 
+    def is_algebraic(self, v, label):
+        """Whether it varies with time and is no state."""
+        return self._times.time(v) is not None and v.parent_component() not in self.given
+
     def _in(self, v, known):
         return self._times.time(v) is None or v in known or self._times.split(v)[1] in self._names[id(known)]
-
-
-class _Relation(NamedTuple):
-    """An equation, or the pair of a positive part (``equation`` is None), with its variables."""
-
-    equation: ConstraintData | None
-    variables: list
-
-
-class _Relations:
-    """The relations between continuous algebraic variables at the labels of inner boundaries."""
-
-    def __init__(self, model, times, labels, continuous):
-        self._times, self._labels, self._continuous = times, labels, continuous
-        rules = continuous.continuity.rules
-        self._parts = ComponentSet(v for v, rule in rules.items() if rule.ctype is Constraint)
-        self._by_label = defaultdict(ComponentMap)
-        for equation in model.component_data_objects(Constraint, active=True, descend_into=Block):
-            if equation.equality and not is_discretisation_equation(equation):
-                self._add(times.time(equation), equation, lambda c=equation: _variables(c.body))
-        for s, rule in rules.items():
-            if rule.ctype is Complementarity:
-                for v in s.values():
-                    self._add(times.time(v), None, lambda v=v, rule=rule: _variables_of_sides(rule[v.index()]._args))
-
-    def _add(self, label, equation, variables):
-        """A relation between continuous variables; equations with others (nu, derivatives) do not determine these."""
-        if label not in self._labels:
-            return
-        relation = _Relation(equation, variables())
-        if all(map(self._continuous.inside, relation.variables)):
-            for v in filter(self._algebraic, relation.variables):
-                self._by_label[label].setdefault(v, []).append(relation)
-
-    def _algebraic(self, v):
-        return self._times.time(v) is not None and v.parent_component() not in self._continuous.given
-
-    def closure(self, label, wanted):
-        """The algebraic variables at ``label`` that ``wanted`` depend on, and the relations between them."""
-        at_label = self._by_label[label]
-        found, relations, waiting = ComponentSet(), {}, list(filter(self._algebraic, wanted))
-        while waiting:
-            v = waiting.pop()
-            if v not in found and v in at_label:
-                found.add(v)
-                relations.update((id(relation), relation) for relation in at_label[v])
-                waiting += (u for relation in at_label[v] for u in relation.variables if self._algebraic(u))
-        kept = self._without_results(list(relations.values()), ComponentSet(wanted))
-        left = ComponentSet(v for relation in kept for v in relation.variables)
-        return [v for v in found if v in left], kept
-
-    def _without_results(self, relations, wanted):
-        """Remove each variable that occurs in one relation only, with this relation, unless it is wanted or a part of a pair."""
-        while True:
-            number = Counter(id(v) for relation in relations for v in ComponentSet(relation.variables))
-            kept = [
-                relation
-                for relation in relations
-                if not any(number[id(v)] == 1 and self._is_result(v) and v not in wanted for v in relation.variables)
-            ]
-            if len(kept) == len(relations):
-                return kept
-            relations = kept
-
-    def _is_result(self, v):
-        return self._algebraic(v) and v.parent_component() not in self._parts
-
-
-def _variables(expr):
-    return list(identify_variables(expr, include_fixed=True)) if hasattr(expr, 'is_expression_type') else []
-
-
-def _variables_of_sides(sides):
-    return [v for side in sides for v in _variables(side)]

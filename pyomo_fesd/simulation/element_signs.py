@@ -6,8 +6,8 @@ Sizes of functions grow with the values seen so far; a value is negative if it i
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator
 
+from pyomo_fesd.core import interpolation_weights
 from pyomo_fesd.simulation.element_residuals import ElementResiduals
 
 #: A value is negative below these parts of its size, and of the solver's scale.
@@ -20,6 +20,8 @@ DIP, BETWEEN = 1e-6, np.linspace(0.0, 1.0, 501)[1:-1]
 RISE = 1e-6
 #: An element that would end before this part of its length ends at its beginning.
 AT_ONCE = 1e-6
+#: A leading coefficient of a polynomial below this part of the largest one is 0.
+ROUND_OFF = 1e-13
 
 
 class ElementSigns:
@@ -66,9 +68,8 @@ class ElementSigns:
     @cached_property
     def _polynomials_between(self):
         """Values of the Lagrange polynomials (rows) between the points, with the left boundary and without it."""
-        nodes = self._nodes
-        with_left = BarycentricInterpolator(np.append(0.0, nodes), np.eye(nodes.size + 1))(BETWEEN).T
-        return with_left, BarycentricInterpolator(nodes, np.eye(nodes.size))(BETWEEN[BETWEEN > nodes[0]]).T
+        later = BETWEEN[BETWEEN > self._nodes[0]]
+        return _values_of_polynomials(np.append(0.0, self._nodes), BETWEEN), _values_of_polynomials(self._nodes, later)
 
     def _grown(self, values):
         return np.maximum(self._sizes, np.abs(values).max(axis=1, initial=0.0))
@@ -113,6 +114,11 @@ def zero_sides(active: np.ndarray) -> np.ndarray:
     return np.arange(active.size) * 2 + active
 
 
+def _values_of_polynomials(nodes, at):
+    """Values of the Lagrange polynomials (rows) at some relative times."""
+    return interpolation_weights(nodes, np.vander(at, nodes.size, increasing=True).T)
+
+
 def _rises_first(polynomial, nodes, row):
     """Whether a polynomial that is zero at the left boundary is clearly positive before the first point, where it is negative."""
     peaks = _real_roots(polynomial.deriv())
@@ -129,5 +135,6 @@ def _first_fall(polynomial, nodes, row):
 
 
 def _real_roots(polynomial):
-    roots = polynomial.roots()
+    # a leading coefficient of round-off has a root at 1e14, beside which the others lose their digits
+    roots = polynomial.trim(ROUND_OFF * np.abs(polynomial.coef).max()).roots()
     return np.sort(roots[np.abs(roots.imag) < 1e-9].real)

@@ -1,10 +1,8 @@
 """One run of a random system with one method, and its verdict."""
 
-import logging
-from contextlib import contextmanager
-
 import numpy as np
 import pyomo.environ as pyo
+from benchmarks.common.warnings_of_package import warnings_of_package
 from benchmarks.random_systems.systems import end_state, model, transform
 
 import pyomo_fesd
@@ -13,21 +11,6 @@ import pyomo_fesd
 TOLERANCE = 1e-3
 RIGHT, ALARM, REFUSED, WRONG = 'right', 'right with a warning', 'refused', 'silently wrong'
 VERDICTS = (RIGHT, ALARM, REFUSED, WRONG)
-
-
-@contextmanager
-def warnings_of_package():
-    """Collect the warnings of pyomo_fesd in a list."""
-    logger, said = logging.getLogger('pyomo_fesd'), []
-    handler = logging.Handler(logging.WARNING)
-    handler.emit = lambda record: said.append(record.getMessage())
-    logger.addHandler(handler)
-    kept, logger.propagate = logger.propagate, False
-    try:
-        yield said
-    finally:
-        logger.removeHandler(handler)
-        logger.propagate = kept
 
 
 def simulate(m, limit):

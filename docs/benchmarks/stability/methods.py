@@ -1,10 +1,9 @@
 """The methods of the stability study: each solves a system and returns an ``Outcome``."""
 
-import logging
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import pyomo.environ as pyo
+from benchmarks.common.warnings_of_package import warnings_of_package
 from benchmarks.stability.systems import end_state, fixed_grid, model, moving_grid, smoothed
 
 import pyomo_fesd
@@ -33,21 +32,6 @@ class Outcome:
     values: list
     said: str = ''
     warned: bool = False
-
-
-@contextmanager
-def warnings_of_package():
-    """Collect the warnings of pyomo_fesd in a list."""
-    logger, said = logging.getLogger('pyomo_fesd'), []
-    handler = logging.Handler(logging.WARNING)
-    handler.emit = lambda record: said.append(record.getMessage())
-    logger.addHandler(handler)
-    kept, logger.propagate = logger.propagate, False
-    try:
-        yield said
-    finally:
-        logger.removeHandler(handler)
-        logger.propagate = kept
 
 
 def outcome_of(solve, values):
