@@ -94,7 +94,9 @@ class HybridSolver:
         if self._c.has_objective:
             return False
         narrow = self._c.widen()
-        self.run.point = feasible_start(self._c, self._subsolves, self._c.x0)
+        self.run.point, self.run.refused = feasible_start(self._c, self._subsolves, self._c.x0)
+        if self.run.refused and self._options.warm_start:
+            self._subsolves.note(f"start not accepted, {self.run.refused}", self._c.x0)
         if narrow:
             self._c.narrow()
         return self.run.point is not None

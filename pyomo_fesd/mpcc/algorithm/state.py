@@ -157,6 +157,8 @@ class Run:
     steps : list of LogEntry
     starts : list of Start
         if there were several; counts are those of all, everything else is the best one's
+    refused : str
+        why the start values are no solution, where there is no objective
     """
 
     outcome: Optional[Outcome] = None
@@ -166,3 +168,4 @@ class Run:
     eps: Optional[float] = None
     steps: list = field(default_factory=list)
     starts: list = field(default_factory=list)
+    refused: str = ''
