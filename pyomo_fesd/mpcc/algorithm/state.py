@@ -46,6 +46,8 @@ class Setup:
         called with the LogEntry of each NLP and LPEC, or with the Start of each of several starts
     after : callable
         called with the Run after every outer iteration; may raise Stop
+    further_start : callable or None
+        returns another start (array), or None, and a note for the log; called once where the homotopy finds no feasible point
     """
 
     compiled: object
@@ -55,6 +57,7 @@ class Setup:
     cache: object
     show: Callable
     after: Callable
+    further_start: Optional[Callable] = None
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ def without_round_off(constraints, lbg: np.ndarray, ubg: np.ndarray) -> tuple[np
     for i in np.flatnonzero(small.any(axis=0)).tolist():
         terms = np.array(_terms(constraints[i]))
         bounds[small[:, i] & (np.abs(bounds[:, i]) <= EXACT * terms), i] = 0.0
-        sizes[i] = terms.max()
+        sizes[i] = terms[small[:, i]].max()
     return bounds[0], bounds[1], sizes
 
 
