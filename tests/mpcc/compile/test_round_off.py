@@ -59,14 +59,15 @@ def test_small_data_stay_small():
 
 
 @given(
-    st.lists(st.floats(-2, 2), min_size=4, max_size=4),
+    st.integers(0, 10**6),
     st.sampled_from([0.0, 1e-16, -1e-16, 1e-14, 1e-12, -1e-10, 1e-8, -1e-6]),
     st.booleans(),
 )
 @settings(max_examples=40, deadline=None)
-def test_multipliers_keep_their_unit_however_near_the_surface_values_are_fixed(numbers, distance, as_parameters):
+def test_multipliers_keep_their_unit_however_near_the_surface_values_are_fixed(seed, distance, as_parameters):
     """lam_p - lam_n = c(x) at a time with fixed x and at one with free x, as a Heaviside form has them."""
-    weights, x0 = np.array(numbers[:2]), np.array(numbers[2:])
+    random = np.random.default_rng(seed)
+    weights, x0 = (random.choice([-1, 1], 2) * random.uniform(0.1, 2, 2) for _ in range(2))
     m = pyo.ConcreteModel()
     m.x = pyo.Var([0, 1], [0, 1], initialize=lambda m, t, i: x0[i])
     m.p, m.n = pyo.Var([0, 1], initialize=0.0, bounds=(0, None)), pyo.Var([0, 1], initialize=0.0, bounds=(0, None))
@@ -77,5 +78,4 @@ def test_multipliers_keep_their_unit_however_near_the_surface_values_are_fixed(n
     m.x[0, 1].fix()
     parameters = parameter_data([m.x[0, 0], m.x[0, 1]] if as_parameters else [])
     c = compile_mpcc(read_mpcc(m), HierarchicalTimer(), parameters=parameters, natural_units='starts')
-    mild = np.abs(weights * x0).max() >= 1e-3
-    assert not mild or (c.scale.x == 1).all()
+    assert (c.scale.x == 1).all()
