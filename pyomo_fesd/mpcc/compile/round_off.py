@@ -53,7 +53,7 @@ def _terms(constraint):
 
 
 def _size(expr):
-    """The size of the terms of an expression of fixed values: the sum of |df/dv v|; for a number its own."""
+    """The size of the terms of an expression of fixed values: the sum of |df/dv v|, 0 without a derivative; for a number its own."""
     if not hasattr(expr, 'is_expression_type'):
         return abs(expr)
     values = list(chain(identify_variables(expr), mutable_parameters(expr)))
@@ -61,7 +61,8 @@ def _size(expr):
         slopes = gradient(expr, values)
     except NotImplementedError:
         return 0.0
-    return sum(abs(slope * value(v)) for slope, v in zip(slopes, values))
+    size = sum(abs(slope * value(v)) for slope, v in zip(slopes, values))
+    return size if np.isfinite(size) else 0.0
 
 
 def parameter_terms(rows, x, p, w, parameters) -> np.ndarray:

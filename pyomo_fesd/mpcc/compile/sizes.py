@@ -33,14 +33,14 @@ def without_small(start: np.ndarray) -> np.ndarray:
     return np.where(np.abs(start) < MILD_SIZES[0], 0.0, start)
 
 
-def variable_factors(J, b: np.ndarray, start: np.ndarray, bounds: tuple, given: np.ndarray, alike: Sequence) -> np.ndarray:
+def variable_factors(J, constants: Sequence, start: np.ndarray, bounds: tuple, given: np.ndarray, alike: Sequence) -> np.ndarray:
     """Return the factors of the variables.
 
     Parameters
     ----------
     J : csr (rows, n)
-    b : array (rows)
-        sizes of the constants of the linearised rows
+    constants : list of arrays (rows)
+        sizes of the constants of the linearised rows; the later ones count for variables without a size by the earlier ones
     start : array (n)
     bounds : (array, array)
         which are mild where a variable may have any value between them
@@ -57,7 +57,9 @@ def variable_factors(J, b: np.ndarray, start: np.ndarray, bounds: tuple, given: 
     bounded = np.maximum(np.abs(bounds[0]), np.abs(bounds[1]))
     mild = (sizes == 0) & (bounded >= MILD_SIZES[0]) & (bounded <= MILD_SIZES[1])
     sizes[mild] = bounded[mild]
-    sizes = np.minimum(_spread(abs(J).tocsr(), b, sizes, group), np.where(bounded > 0, bounded, np.inf))
+    for b in constants:
+        sizes = _spread(abs(J).tocsr(), b, sizes, group)
+    sizes = np.minimum(sizes, np.where(bounded > 0, bounded, np.inf))
     sizes = np.where(sizes > 0, np.maximum(sizes, _largest_of_group(np.abs(start), group)), 0.0)
     return np.where(given != 1.0, given, _factors(sizes, MILD_SIZES))
 

@@ -53,6 +53,12 @@ def test_rows_without_fixed_values_and_nonlinear_ones_stay():
     assert cleaned(m.nonlinear, 1e-17) == (1e-17, 0.0)
 
 
+def test_terms_without_a_derivative_show_nothing():
+    m = sums(0.0)
+    m.root = pyo.Constraint(expr=m.v == pyo.sqrt(m.a) + 1e-9)
+    assert cleaned(m.root, 1e-9) == (1e-9, 0.0)
+
+
 def test_small_data_stay_small():
     m = sums(1e-12, 2e-12, 1e-12)
     assert cleaned(m.equation, 2e-12) == (2e-12, pytest.approx(4e-12))

@@ -96,7 +96,7 @@ def factors(J, b, start, given=None, alike=()):
     n = len(start)
     bounds = np.full(n, -np.inf), np.full(n, np.inf)
     given = np.ones(n) if given is None else np.array(given)
-    return variable_factors(sparse.csr_matrix(J), np.array(b), np.array(start, dtype=float), bounds, given, list(alike))
+    return variable_factors(sparse.csr_matrix(J), [np.array(b)], np.array(start, dtype=float), bounds, given, list(alike))
 
 
 def test_mild_problems_are_left_alone():
