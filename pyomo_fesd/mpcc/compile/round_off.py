@@ -53,7 +53,7 @@ def _terms(constraint):
 
 
 def _size(expr):
-    """The size of the terms of an expression of fixed values: the sum of |df/dv v|, 0 without a derivative; for a number its own."""
+    """The size of the terms of an expression of fixed values: sum of |df/dv v|, 0 without a derivative; of a number its own."""
     if not hasattr(expr, 'is_expression_type'):
         return abs(expr)
     values = list(chain(identify_variables(expr), mutable_parameters(expr)))
