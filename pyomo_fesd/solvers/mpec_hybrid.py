@@ -124,15 +124,12 @@ class MpecHybrid(CasadiSolver):
                 else:
                     compiled = record.compiled = ready.compiled
                     table.begin(compiled)
-                    after = reporter(config.callback, compiled, started)
-                    setup = Setup(compiled, config, config.timer, ready.deadline, ready.cache, table.row, after)
+                    shared = compiled, config, config.timer, ready.deadline, ready.cache
+                    setup = Setup(*shared, table.row, reporter(config.callback, compiled, started), start.further(compiled))
                     solver = (Multistart if config.starts > 1 else HybridSolver)(setup)
                     record.run = solver.run
                     fill_results(results, model, solver.solve(), set_indicators, compiled, names=user_names)
-                    if results.solution_status is SolutionStatus.infeasible:
-                        results.extra_info.reason = with_structure(results.extra_info.reason, model)
-                if start.note and not start.found and results.solution_status is not SolutionStatus.optimal:
-                    results.extra_info.reason = '; '.join(filter(None, (results.extra_info.reason, start.note)))
+                _explain(results, model, record, start)
                 loaded = self._load(results)
                 if not loaded:
                     start.restore()
@@ -202,14 +199,24 @@ class LegacyMpecHybrid(LegacyPlugin, MpecHybrid):
 
     def _map_results(self, model, results):
         legacy, solution = super()._map_results(model, results)
-        if results.solution_status is SolutionStatus.optimal:
-            legacy.solver.message = results.extra_info.outcome
+        info, optimal = results.extra_info, results.solution_status is SolutionStatus.optimal
+        legacy.solver.message = info.outcome if optimal or not info.reason else f"{info.outcome}; {info.reason}"
         return legacy, solution
 
 
 SolverFactory.register(NAME, doc="Certified MPCC solutions: Reg(eps) in Ipopt and a reduced LPEC in HiGHS")(
     MpecHybrid, LegacyMpecHybrid
 )
+
+
+def _explain(results, model, record, start):
+    """Add to the reason of a failure what the structure of the model and the simulated start show."""
+    info = results.extra_info
+    if results.solution_status is SolutionStatus.infeasible and record.run is not None:
+        info.reason = with_structure(info.reason, model)
+    if results.solution_status is not SolutionStatus.optimal:
+        refused = '' if record.run is None else record.run.refused
+        info.reason = '; '.join(filter(None, (info.reason, start.reason(refused))))
 
 
 @interruptible

@@ -25,12 +25,11 @@ from pyomo_fesd.mpcc.compile.mpcc_functions import (
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.nl_index import NlIndex
 from pyomo_fesd.mpcc.compile.parameters import parameter_values
+from pyomo_fesd.mpcc.compile.round_off import EXACT, parameter_terms
 from pyomo_fesd.mpcc.compile.scaling import Scale, side_factors
 from pyomo_fesd.mpcc.compile.sizes import row_factors, variable_factors, without_small
 
 UNBOUNDED = (-np.inf, np.inf)
-#: Constants of linearised rows below this part of their terms are rounding errors.
-EXACT = 1e-13
 #: Variables of a nonlinear model that may be scaled by coefficients.
 SMALL = 100
 #: By what variables and rows without a factor of the user are scaled: see ``compile_mpcc``.
@@ -108,22 +107,37 @@ def _factors_by_size(nl, index, sides, at, variables, given_x, given_g, hints):
     all_rows = ca.vertcat(rows, take(stack, sides))
     function = ca.Function('rows', [w, p], [all_rows, ca.jacobian(all_rows, w)])
     bounds = np.concatenate([nl.lbg[index.model_rows], np.zeros(len(sides))])
-    J, constants = _linearised(function, without_small(at[0]), at[1], bounds)
+    begin = without_small(at[0])
+    cancelling = np.concatenate([nl.cancelling[index.model_rows], _of_rows(nl.cancelling, sides)])
+    cancelling = np.maximum(cancelling, parameter_terms(all_rows, w, p, begin, at[1]))
+    J, constants = _linearised(function, begin, at[1], bounds, cancelling)
+    # sides are zero at solutions, and so may be what is left of them
+    certain = constants.copy()
+    certain[len(index.model_rows) :] = without_small(certain[len(index.model_rows) :])
     columns = {id(v): j for j, v in enumerate(variables)}
     alike = [[columns[id(v)] for v in group if id(v) in columns] for group in hints.alike]
-    s_x = variable_factors(J, constants, at[0], stated_bounds(variables), given_x, [group for group in alike if group])
+    s_x = variable_factors(J, (certain, constants), at[0], stated_bounds(variables), given_x, [group for group in alike if group])
     J = csr(function(*at)[1])[: len(index.model_rows)]
     return s_x, row_factors(J @ sparse.diags(1 / s_x), given_g)
 
 
-def _linearised(function, w, p, bounds):
-    """Jacobian of rows and their distances from ``bounds`` where the variables are 0, without rounding errors."""
+def _of_rows(values, addresses):
+    """The values (one each row of the file) of those addresses that are rows, 0 for the others."""
+    is_row = (addresses >= 0) & (addresses < len(values))
+    return np.where(is_row, np.append(values, 0.0)[np.where(is_row, addresses, -1)], 0.0)
+
+
+def _linearised(function, w, p, bounds, cancelling):
+    """Jacobian of rows, and the sizes of their distances from ``bounds`` where the variables are 0, without rounding errors.
+
+    A constant in which terms of the sizes ``cancelling`` cancel has their size.
+    """
     values, J = function(w, p)
     J = csr(J)
     found = np.asarray(values, dtype=float).ravel() - J @ w
-    constants = found - np.where(np.isfinite(bounds), bounds, 0.0)
-    exact = np.abs(constants) > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
-    return J, np.where(exact, constants, 0.0)
+    constants = np.abs(found - np.where(np.isfinite(bounds), bounds, 0.0))
+    exact = constants > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
+    return J, np.maximum(np.where(exact, constants, 0.0), cancelling)
 
 
 def _substitute(nl, index, s_x):

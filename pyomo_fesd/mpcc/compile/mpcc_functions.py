@@ -255,6 +255,10 @@ class MpccFunctions:
         self._data = replace(self._data, **self._model_values.read())
         self.__dict__.update(vars(self._data))
 
+    def present_values(self):
+        """The variables' present values in the model, projected to their bounds."""
+        return self._model_values.read()['x0']
+
     def narrow(self):
         """Let branches, too, have the lower guide bounds."""
         self.lbx = self.guide_lbx

@@ -24,6 +24,8 @@ CONDITIONS = {
     Outcome.INTERRUPTED: (TerminationCondition.interrupted, SolutionStatus.unknown),
     Outcome.STOPPED: (TerminationCondition.interrupted, SolutionStatus.unknown),
 }
+#: Outcomes whose least infeasible point shows what is wrong, unless there is a feasible one.
+WITHOUT_POINT = (Outcome.INFEASIBLE, Outcome.TIME_LIMIT, Outcome.ITERATION_LIMIT)
 #: Measures of a certificate, None without one.
 MEASURES = ('violation', 'complementarity', 'violation_scaled', 'complementarity_scaled')
 #: Number of violated pairs and rows that a report names.
@@ -82,8 +84,8 @@ def _status_of(run):
 
 
 def _violated(c, run, names):
-    """The most violated rows and pairs of an infeasible problem, by name."""
-    if run.outcome is not Outcome.INFEASIBLE or run.w is None:
+    """The most violated rows and pairs of a run that found no feasible point, by name."""
+    if run.outcome not in WITHOUT_POINT or run.point is not None or run.w is None:
         return []
     at = c.evaluate(run.w)
     rows, _ = c.violations(run.w, at)
