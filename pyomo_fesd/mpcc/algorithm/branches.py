@@ -99,6 +99,19 @@ class Branches:
                 if self.run.point.f < point.f - PROGRESS * max(1.0, abs(point.f)):
                     neighbours = list(self._c.neighbours)
 
+    def without_short(self, point):
+        """A better point in a neighbouring branch for a variable of ``point`` at its lower bound; None if there is none.
+
+        What a place of least extent holds is as small as the tolerances: the LPEC does not see that only the bound keeps it.
+        """
+        enough = point.f - PROGRESS * max(1.0, abs(point.f))
+        for neighbour in self._c.neighbours:
+            zero = self._zero_sides(point, neighbour) if neighbour.short.size else None
+            found = None if zero is None else self.certified(point.w, zero, max_iter=SECOND)
+            if _is_below(found, enough):
+                return found
+        return None
+
     def _widen_from(self, end):
         """Go on without guide bounds from a point below the incumbent that only these keep from descending."""
         if end is None or end.certificate.grade is not Stationarity.LIMITED:

@@ -74,16 +74,20 @@ class Homotopy:
         form = self._options.relaxation
         self._paths = AUTO[self._c.has_objective] if form == 'auto' else ((form,) * 2,)
         self._recoveries = list(RECOVERIES)
+        self._position = _Position(0, start, self._options.eps_init)
         self.end, self.finished = None, False
 
-    def follow(self):
-        """Run until the incumbent is settled or nothing is left to try."""
-        position = _Position(0, self._start, self._options.eps_init)
-        while position is not None:
-            self.run.eps = position.eps
-            relaxed = self._relax(position)
+    def follow(self, patience=None):
+        """Run until the incumbent is settled or nothing is left to try.
+
+        After the Deadline ``patience`` it pauses while there is no feasible point; the next call goes on.
+        """
+        while self._position is not None and not (patience is not None and patience.expired() and self.run.point is None):
+            self.run.eps = self._position.eps
+            relaxed = self._relax(self._position)
             self._subsolves.keep_least_infeasible(relaxed.w)
-            position = (self._next if self._subsolves.usable(relaxed) else self._recover)(position, relaxed)
+            step = self._next if self._subsolves.usable(relaxed) else self._recover
+            self._position = step(self._position, relaxed)
 
     def _relax(self, position):
         form, duals = self._form(position), self._duals(position)
