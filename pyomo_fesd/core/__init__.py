@@ -51,6 +51,7 @@ from pyomo_fesd.core.private_data import records_below, remember_records
 from pyomo_fesd.core.renamed import Renamed
 from pyomo_fesd.core.rollback import restored_on_error
 from pyomo_fesd.core.switched_systems import (
+    Dependents,
     HysteresisMode,
     Reset,
     Step,

@@ -81,6 +81,23 @@ class Step:
 
 
 @dataclass(frozen=True)
+class Dependents:
+    """Generated variables of one time that follow from expressions, such as p, n and nu from a switching function.
+
+    Attributes
+    ----------
+    variables : tuple of VarData
+    arguments : tuple of expressions
+    values : callable (list of float) -> list of float
+        the values of the variables at values of the arguments; nan where they leave a variable open
+    """
+
+    variables: tuple
+    arguments: tuple
+    values: Callable
+
+
+@dataclass(frozen=True)
 class Surface:
     """One surface of a piecewise function at one time.
 
@@ -138,6 +155,7 @@ class SwitchedSystems(AutoSlots.Mixin):
         DisjunctData and LogicalConstraintData that logic between modes switched off, not the user: at further times they are
         written again
     steps : list of Step
+    dependents : list of Dependents
     surfaces : list of Surface
     hysteresis : list of HysteresisMode
     resets : list of Reset
@@ -157,6 +175,7 @@ class SwitchedSystems(AutoSlots.Mixin):
         'multipliers',
         'excluded',
         'steps',
+        'dependents',
         'surfaces',
         'hysteresis',
         'resets',
@@ -169,7 +188,7 @@ class SwitchedSystems(AutoSlots.Mixin):
     def __init__(self):
         self.continuous, self.multipliers = ComponentMap(), ComponentMap()
         self.selectors, self.excluded, self.signals = ComponentSet(), ComponentSet(), ComponentSet()
-        self.steps, self.surfaces, self.hysteresis, self.resets = [], [], [], []
+        self.steps, self.dependents, self.surfaces, self.hysteresis, self.resets = [], [], [], [], []
         self.writers, self.waiting, self.breakpoints = [], [], []
 
     def include(self, other: 'SwitchedSystems') -> 'SwitchedSystems':
@@ -187,6 +206,7 @@ class SwitchedSystems(AutoSlots.Mixin):
         self.selectors -= gone
         self.excluded -= gone
         self.steps = [step for step in self.steps if step.nu not in gone]
+        self.dependents = [one for one in self.dependents if not any(v in gone for v in one.variables)]
         self.surfaces = [surface for surface in self.surfaces if surface.variable not in gone]
 
 

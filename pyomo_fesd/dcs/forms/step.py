@@ -9,12 +9,17 @@ Leaves: ``alpha``, ``p``, ``n``, ``switching`` (c = p - n) and ``complementarity
 Does not apply: to continuous piecewise functions, which need one variable only (``core/positive_part.py``).
 """
 
+from math import nan
+
 from pyomo.core import Constraint, Var
 from pyomo.core.base.block import BlockData
 from pyomo.core.base.var import VarData
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import Step, switched_systems, value_or_zero
+from pyomo_fesd.core import Dependents, Step, switched_systems, value_or_zero
+
+#: Values below this are 0.
+ZERO = 1e-8
 
 
 def declare_step(block: BlockData, *sets) -> None:
@@ -40,9 +45,17 @@ def add_step(block: BlockData, index: tuple, c, lean: float = 0.0) -> VarData:
     """
     alpha, p, n = (variable[index or None] for variable in (block.alpha, block.p, block.n))
     now = float(value_or_zero(c))  # start values may be numpy numbers, whose comparisons cannot be subtracted
-    alpha.value, p.value, n.value = 0.5 + lean * ((now > 0) - (now < 0)), max(now, 0.0), max(-now, 0.0)
+    p.value, n.value, _ = step_values([now])
+    alpha.value = 0.5 + lean * ((now > 0) - (now < 0))
     block.switching.add(index or None, c == p - n)
     block.complementarity.add((*index, 1), complements(alpha >= 0, n >= 0))
     block.complementarity.add((*index, 2), complements(1 - alpha >= 0, p >= 0))
     switched_systems(block).steps.append(Step(alpha, c))
+    switched_systems(block).dependents.append(Dependents((p, n, alpha), (c,), step_values))
     return alpha
+
+
+def step_values(arguments: list[float]) -> list[float]:
+    """Return p, n and alpha of one value of c; alpha is nan, open, where c is 0."""
+    (c,) = arguments
+    return [max(c, 0.0), max(-c, 0.0), nan if abs(c) <= ZERO else float(c > 0)]
