@@ -17,6 +17,7 @@ from pyomo_fesd.refinement import refine
 from pyomo_fesd.results import element_lengths, physical_time, plot, switches, trajectory
 from pyomo_fesd.simulation import simulate
 from pyomo_fesd.solvers import certify
+from pyomo_fesd.starts import start_from
 
 __all__ = [
     'FesdError',
@@ -35,6 +36,7 @@ __all__ = [
     'report',
     'signal',
     'simulate',
+    'start_from',
     'state_jump',
     'structure',
     'switches',

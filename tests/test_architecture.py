@@ -16,6 +16,7 @@ FLOORS = (
     ('diagnostics',),
     ('solvers',),
     ('simulation',),
+    ('starts',),
     ('refinement',),
 )
 #: The rooms inside a room, each importing only from those before it.
@@ -84,6 +85,7 @@ def test_public_names():
         'report',
         'signal',
         'simulate',
+        'start_from',
         'state_jump',
         'structure',
         'switches',

@@ -19,6 +19,7 @@ from pyomo.dae import ContinuousSet
 from pyomo_fesd.core import FesdError, TimeIndex, moving_grids
 from pyomo_fesd.refinement.dense_output import RoundSolution
 from pyomo_fesd.simulation import simulate
+from pyomo_fesd.starts import numbers_of_elements, set_within_bounds
 
 
 def start_from(model: Block, wrt: ContinuousSet, solution: RoundSolution) -> None:
@@ -27,10 +28,10 @@ def start_from(model: Block, wrt: ContinuousSet, solution: RoundSolution) -> Non
     grid = moving.grid
     over_time = _variables_over_time(model, wrt, solution)
     for v, was in solution.constants.items():
-        _set_within_bounds(v, was)
+        set_within_bounds(v, was)
     for name, found in over_time.items():
         if wrt.first() in found:
-            _set_within_bounds(found[wrt.first()], solution.values[name][wrt.first()])
+            set_within_bounds(found[wrt.first()], solution.values[name][wrt.first()])
     for element, piece, begin, end in _placed(grid, solution):
         _set_length(moving.r[element.n], grid, element, solution, end - begin)
         times = begin + (end - begin) * np.array([*grid.tau, 1.0][: len(element.own_labels)])
@@ -58,28 +59,14 @@ def _set_length(multiplier, grid, element, solution, h):
 def _set_all(variables, labels, numbers):
     for label, number in zip(labels, numbers):
         if label in variables:
-            _set_within_bounds(variables[label], number)
-
-
-def _set_within_bounds(v, number):
-    """Set a value within the bounds, unless it is None or nan."""
-    if number is not None and not np.isnan(number):
-        v.set_value(float(np.clip(number, v.lb, v.ub)) if v.has_lb() or v.has_ub() else float(number), skip_validation=True)
+            set_within_bounds(variables[label], number)
 
 
 def _placed(grid, solution) -> Iterator[tuple]:
     """``(element, piece, begin, end)`` of all elements of the new grid, on physical time."""
     for stage, elements in grid.stages.items():
         pieces, waiting = [p for p in solution.pieces if p.stage == stage], iter(elements)
-        for piece, number in zip(pieces, _numbers([p.length for p in pieces], len(elements))):
+        for piece, number in zip(pieces, numbers_of_elements([p.length for p in pieces], len(elements))):
             nodes = np.linspace(piece.nodes[0], piece.nodes[-1], number + 1)
             for begin, end in zip(nodes, nodes[1:]):
                 yield next(waiting), piece, begin, end
-
-
-def _numbers(lengths, total):
-    """Numbers of elements with the sum ``total``, at least one for each length, that make the longest element shortest."""
-    found = [1] * len(lengths)
-    for _ in range(total - len(lengths)):
-        found[int(np.argmax(np.divide(lengths, found)))] += 1
-    return found

@@ -10,4 +10,4 @@ from pyomo_fesd.results.physical_time import element_lengths, physical_time
 from pyomo_fesd.results.plot import plot
 from pyomo_fesd.results.switches import switches
 from pyomo_fesd.results.switching_functions import SwitchingFunction, largest_value, switching_functions
-from pyomo_fesd.results.trajectory import jumps_that_happen, trajectory
+from pyomo_fesd.results.trajectory import columns_over_time, jumps_that_happen, trajectory

@@ -12,4 +12,5 @@ One element: ``equation_reader`` reads its ``element_equations``, ``structural_k
 
 from pyomo_fesd.simulation import first_guess
 from pyomo_fesd.simulation.progress import TooFewElements
+from pyomo_fesd.simulation.scalar_results import evaluate_scalars
 from pyomo_fesd.simulation.simulate import simulate, states_fixed_later
