@@ -18,11 +18,13 @@ Leaves: ``w``, ``lam``, ``slope`` (a, then b), ``stationarity``, ``combination``
 Does not apply: to functions that jump from one simplex to the next (``simplices.py``); to triangulations that are not regular.
 """
 
+from functools import partial
+
 import numpy as np
 from pyomo.core import Constraint, RangeSet, Var, value
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import FesdError, switched_systems, value_or_nan
+from pyomo_fesd.core import Dependents, FesdError, switched_systems, value_or_nan
 from pyomo_fesd.dcs.piecewise import simplices
 from pyomo_fesd.dcs.piecewise.generated_blocks import delete_data
 from pyomo_fesd.dcs.piecewise.regular_triangulation import RegularTriangulation
@@ -104,17 +106,32 @@ def _declare_triangulation(block, wrt, triangulation):
 def _add_optimality_conditions(block, time, triangulation, args):
     """Add the optimality conditions at one time, starting from the present values of the arguments."""
     now = [value_or_nan(x) for x in args]
-    simplex, w, slope = triangulation.at(now if np.isfinite(now).all() else triangulation.corner)
-    # one row for each coordinate, one for the sum of the weights
-    corners = np.column_stack([triangulation.unit, np.ones(len(triangulation.unit))])
-    for k, a, column, x in zip(block.rows, slope, corners.T, (*triangulation.local(args), 1)):
-        block.slope[time, k].value = a
+    now = now if np.isfinite(now).all() else triangulation.corner
+    simplex, corners = triangulation.at(now)[0], _corners(triangulation)
+    for k, column, x in zip(block.rows, corners.T, (*triangulation.local(args), 1)):
         combined = sum(float(c) * block.w[time, v] for c, v in zip(column, block.vertices) if c)
         block.combination.add((time, k), combined == x)
-    for v, height, start, corner in zip(block.vertices, triangulation.heights, w, corners):
-        plane = sum(c * block.slope[time, k] for c, k in zip(corner, block.rows) if c)
-        block.w[time, v].value, block.lam[time, v].value = start, max(0.0, height - value(plane))
+    slope = [block.slope[time, k] for k in block.rows]
+    for v, height, corner in zip(block.vertices, triangulation.heights, corners):
+        plane = sum(c * a for c, a in zip(corner, slope) if c)
         block.stationarity.add((time, v), height - plane - block.lam[time, v] == 0)
         block.complementarity.add((time, v), complements(block.w[time, v] >= 0, block.lam[time, v] >= 0))
     # as many as there are slopes: with them the others are determined too
     switched_systems(block).selectors.update(block.lam[time, v + 1] for v in simplex)
+    variables = (*(block.w[time, v] for v in block.vertices), *slope, *(block.lam[time, v] for v in block.vertices))
+    for variable, number in zip(variables, _optimal_values(triangulation, now)):
+        variable.value = number
+    dependents = Dependents(variables, tuple(args), partial(_optimal_values, triangulation))
+    switched_systems(block).dependents.append(dependents)
+
+
+def _corners(triangulation):
+    """A row for each vertex: its coordinates, and 1 for the sum of the weights."""
+    return np.column_stack([triangulation.unit, np.ones(len(triangulation.unit))])
+
+
+def _optimal_values(triangulation, arguments):
+    """Values of w, slope and lam at values of the arguments."""
+    _, w, slope = triangulation.at(np.array(arguments))
+    lam = np.maximum(0.0, triangulation.heights - _corners(triangulation) @ slope)
+    return [float(number) for number in (*w, *slope, *lam)]
