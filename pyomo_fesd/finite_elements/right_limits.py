@@ -15,12 +15,12 @@ Does not apply: to variables that are continuous only by the user's word.
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core.expr.visitor import replace_expressions
 
-from pyomo_fesd.core import Element, MovingGrid, Pair, TimeIndex, derivatives
+from pyomo_fesd.core import Dependents, Element, MovingGrid, Pair, TimeIndex, all_switched_systems, derivatives, switched_systems
 from pyomo_fesd.finite_elements.continuity import Continuity
 from pyomo_fesd.finite_elements.explicit_time import differ
 from pyomo_fesd.finite_elements.relations import Relations, variables_in, variables_in_sides
@@ -45,6 +45,7 @@ class RightLimits:
         inner = moving.grid.elements[:-1] if self._jumps is not None else ()
         self._states = {e.n: self._jumps.values_after(e) for e in inner}
         self._copies, self._done = {n: ComponentMap() for n in self._states}, ComponentSet()
+        self._copied_dependents = set()
 
     @cached_property
     def _relations(self):
@@ -95,6 +96,7 @@ class RightLimits:
             for v in (v for v in tied if v not in copies):
                 copies[v] = self._copy(before.n, v)
             self._copy_equations(before.n, [r.equation for r in relations if r.equation is not None])
+            self._copy_dependents(before.n)
         return {id(v): known[v] for v in variables for known in (states, copies) if v in known}
 
     def _copy(self, boundary, v):
@@ -104,16 +106,47 @@ class RightLimits:
 
     def _copy_equations(self, boundary, equations):
         """Impose ``equations`` on the states after the boundary and the copies."""
-        swap = {id(v): after for known in (self._states, self._copies) for v, after in known[boundary].items()}
+        swap = self._swaps(boundary)
         for equation in equations:
             if equation not in self._done:
                 self._done.add(equation)
                 place = self._place(sum(1 for b, _ in self._jumps.copied if b == boundary) + 1)
                 self._jumps.copied.add((boundary, place), replace_expressions(equation.expr, swap))
 
+    def _copy_dependents(self, boundary):
+        """Record how the copies follow from the states after the boundary."""
+        copies, swap = self._copies[boundary], self._swaps(boundary)
+        found = {id(one): one for v in copies for one in self._dependents.get(v, ())}
+        for key, one in found.items():
+            if (boundary, key) not in self._copied_dependents:
+                self._copied_dependents.add((boundary, key))
+                among = [k for k, v in enumerate(one.variables) if v in copies]
+                arguments = tuple(replace_expressions(a, swap) if hasattr(a, 'is_expression_type') else a for a in one.arguments)
+                variables = tuple(copies[one.variables[k]] for k in among)
+                record = Dependents(variables, arguments, partial(_some, one.values, among))
+                switched_systems(self._jumps.block).dependents.append(record)
+
+    @cached_property
+    def _dependents(self):
+        """The records by the variables that they determine."""
+        found = ComponentMap()
+        for one in all_switched_systems(self._moving.block.model()).dependents:
+            for v in one.variables:
+                found.setdefault(v, []).append(one)
+        return found
+
+    def _swaps(self, boundary):
+        return {id(v): after for known in (self._states, self._copies) for v, after in known[boundary].items()}
+
     def _place(self, number):
         self._jumps.block.place.add(number)
         return number
+
+
+def _some(values, among, arguments):
+    """Some of the values of a ``Dependents``."""
+    found = values(arguments)
+    return [found[k] for k in among]
 
 
 class _Continuous:

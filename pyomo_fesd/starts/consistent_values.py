@@ -5,8 +5,9 @@ In this order, as far as one after the other is determined:
 * derivatives from the equations of collocation;
 * multipliers of modes from the weights that the table gives;
 * the parts p and n, lam and mu, and the multipliers nu from the switching functions; a function that is 0 leaves nu open;
-* positive parts from their conditions;
-* any variable that is the only one left in an equation, first in those without derivatives.
+* positive parts from their conditions, and a side of a pair that is 0 because the other is not;
+* any variable that is the only one left in an equation, first in those without derivatives;
+* multipliers that are open at one point of an element, from the point beside it.
 
 Takes: a transformed model, the variables without a value of their own, and weights of modes.
 Leaves: values; variables that only several equations together determine keep theirs.
@@ -34,6 +35,7 @@ from pyomo_fesd.core import (
     is_discretisation_equation,
     read_complementarity,
     value_or_nan,
+    withheld_messages,
 )
 from pyomo_fesd.starts.element_placement import set_within_bounds
 
@@ -84,10 +86,15 @@ def make_consistent(moving: MovingGrid, weights: Iterable[tuple], unknown: Compo
         if is_discretisation_equation(equation):
             _solve_rates(equation, rates, unknown)
             continue
-        variables = list(identify_variables(equation.body, include_fixed=False))
+        variables = _variables_list(equation.body)
         (with_rates if any(v in rates for v in variables) else without).append((variables, None, _of_equation(equation)))
-    first = [*_of_weights(weights), *_of_dependents(model, times), *_of_positive_parts(model, times), *_of_splits(moving), *without]
-    _solve_in_turn([first, with_rates], unknown)
+    # Gauss: multipliers at element boundaries; state jumps: variables after them
+    limits = [] if moving.left_limit is None else list(moving.left_limit.values())
+    copied = [] if moving.state_jumps is None else list(moving.state_jumps.copied.values())
+    without += [(_variables_list(row.body), None, _of_equation(row)) for row in (*limits, *copied)]
+    parts = [*_of_dependents(model), *_of_positive_parts(model, times), *_of_splits(moving), *_of_pairs(moving)]
+    first = [*_of_weights(weights), *parts, *without]
+    _solve_in_turn([first, with_rates, list(_of_elements(moving, times))], unknown)
 
 
 def _equations(model, times):
@@ -110,7 +117,8 @@ def _of_equation(equation):
 
     def solve(v):
         before = v.value
-        with suppress(ArithmeticError, ValueError, RuntimeError):
+        # a value outside of the bounds is set to the bound later
+        with suppress(ArithmeticError, ValueError, RuntimeError), withheld_messages('pyomo'):
             if before is None:
                 v.set_value(0.0, skip_validation=True)
             calculate_variable_from_constraint(v, equation)
@@ -121,17 +129,22 @@ def _of_equation(equation):
     return solve
 
 
+def _variables_list(expr):
+    return list(identify_variables(expr, include_fixed=False))
+
+
 def _of_weights(weights) -> Iterator[tuple]:
     """The last unknown multiplier of a weight; weights are linear in each of them."""
     for weight, number in weights:
-        variables = list(identify_variables(weight, include_fixed=False))
-        yield variables, None, lambda v, weight=weight, number=number: [(v, _root(v, weight, number))]
+        yield _variables_list(weight), None, lambda v, weight=weight, number=number: [(v, _root(v, weight, number))]
 
 
 def _root(v, expr, number):
     """The value of ``v`` at which ``expr``, linear in it, is ``number``; nan where it does not matter."""
     at_zero, slope = (line[0] for line in _lines(v, [expr]))
-    return (number - at_zero) / slope if abs(slope) > ROUNDING else np.nan
+    if not abs(slope) > ROUNDING:
+        return np.nan
+    return (number - at_zero) / slope
 
 
 def _lines(v, expressions):
@@ -144,11 +157,26 @@ def _lines(v, expressions):
     return np.array(found[0]), np.subtract(found[1], found[0])
 
 
-def _of_dependents(model, times) -> Iterator[tuple]:
+def _of_dependents(model) -> Iterator[tuple]:
     for one in all_switched_systems(model).dependents:
-        if times.time(one.variables[0]) is not None:
-            arguments = [v for expr in one.arguments for v in _variables(expr)]
-            yield [*one.variables, *arguments], ComponentSet(one.variables), lambda _, one=one: _dependent_values(one)
+        arguments = [v for expr in one.arguments for v in _variables(expr)]
+        yield [*one.variables, *arguments], ComponentSet(one.variables), lambda _, one=one: _dependent_values(one)
+
+
+def _of_pairs(moving) -> Iterator[tuple]:
+    """The last unknown of a pair: its side is 0 where the other is not."""
+    for condition in moving.complementarities:
+        for pair in condition.sides.values():
+            variables = [v for side in pair for v in _variables(side)]
+            yield variables, None, lambda v, pair=pair: [(v, _opposite(v, pair))]
+
+
+def _opposite(v, pair):
+    """The value of ``v`` at which its side is 0, if the other side is positive; else nan."""
+    for side, other in (pair, reversed(pair)):
+        if value_or_nan(other) > ZERO and not any(u is v for u in _variables(other)):
+            return _root(v, side, 0.0)
+    return np.nan
 
 
 def _of_splits(moving) -> Iterator[tuple]:
@@ -173,6 +201,22 @@ def _variables(expr):
 def _dependent_values(one):
     numbers = [value_or_nan(expr) for expr in one.arguments]
     return zip(one.variables, one.values(numbers)) if np.isfinite(numbers).all() else ()
+
+
+def _of_elements(moving, times) -> Iterator[tuple]:
+    """A multiplier that is open at one point of an element is 0 or 1 where it is so at the point beside it."""
+    multipliers = ComponentSet(v for one in all_switched_systems(moving.block.model()).dependents for v in one.variables)
+    for by_label in times.families(multipliers).values():
+        for element in moving.grid.elements:
+            first = [moving.wrt.first()] if element.n == 1 else []
+            found = [by_label[t] for t in (*first, *element.own_labels) if t in by_label]
+            for both in zip(found, found[1:]):
+                yield [*both], None, lambda v, both=both: [(v, _extreme(next(w for w in both if w is not v)))]
+
+
+def _extreme(v):
+    """The value of a multiplier if it is 0 or 1, else nan."""
+    return v.value if v.value in (0.0, 1.0) else np.nan
 
 
 def _of_positive_parts(model, times) -> Iterator[tuple]:

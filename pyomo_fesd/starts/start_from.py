@@ -120,6 +120,8 @@ def _set_values(model, moving, table, columns):
     known = ComponentSet([*states, *held, *given])
     variables = model.component_data_objects(Var, descend_into=(Block, Disjunct))
     unknown = ComponentSet(v for v in variables if not v.fixed and v not in known and times.time(v) is not None)
+    if moving.state_jumps is not None:
+        unknown.update(moving.state_jumps.copy.values())
     make_consistent(moving, list(_weights(table, columns, physical)), unknown)
     set_hysteresis(moving)
 
