@@ -7,7 +7,8 @@ In this order, as far as one after the other is determined:
 * the parts p and n, lam and mu, and the multipliers nu from the switching functions; a function that is 0 leaves nu open;
 * positive parts from their conditions, and a side of a pair that is 0 because the other is not;
 * any variable that is the only one left in an equation, first in those without derivatives;
-* multipliers that are open at one point of an element, from the point beside it.
+* multipliers that are open at one point of an element, and derivatives that have no equation of collocation, from the point
+  beside it.
 
 Takes: a transformed model, the variables without a value of their own, and weights of modes.
 Leaves: values; variables that only several equations together determine keep theirs.
@@ -94,7 +95,7 @@ def make_consistent(moving: MovingGrid, weights: Iterable[tuple], unknown: Compo
     without += [(_variables_list(row.body), None, _of_equation(row)) for row in (*limits, *copied)]
     parts = [*_of_dependents(model), *_of_positive_parts(model, times), *_of_splits(moving), *_of_pairs(moving)]
     first = [*_of_weights(weights), *parts, *without]
-    _solve_in_turn([first, with_rates, list(_of_elements(moving, times))], unknown)
+    _solve_in_turn([first, with_rates, list(_of_neighbours(moving, times, rates))], unknown)
 
 
 def _equations(model, times):
@@ -203,20 +204,21 @@ def _dependent_values(one):
     return zip(one.variables, one.values(numbers)) if np.isfinite(numbers).all() else ()
 
 
-def _of_elements(moving, times) -> Iterator[tuple]:
-    """A multiplier that is open at one point of an element is 0 or 1 where it is so at the point beside it."""
+def _of_neighbours(moving, times, rates) -> Iterator[tuple]:
+    """A multiplier that is open at one point of an element is 0 or 1 where it is so at the point beside it; a rate is equal."""
     multipliers = ComponentSet(v for one in all_switched_systems(moving.block.model()).dependents for v in one.variables)
-    for by_label in times.families(multipliers).values():
+    for by_label in times.families([*multipliers, *rates]).values():
         for element in moving.grid.elements:
             first = [moving.wrt.first()] if element.n == 1 else []
             found = [by_label[t] for t in (*first, *element.own_labels) if t in by_label]
             for both in zip(found, found[1:]):
-                yield [*both], None, lambda v, both=both: [(v, _extreme(next(w for w in both if w is not v)))]
+                yield [*both], None, lambda v, both=both: [(v, _as_beside(v, both, v in rates))]
 
 
-def _extreme(v):
-    """The value of a multiplier if it is 0 or 1, else nan."""
-    return v.value if v.value in (0.0, 1.0) else np.nan
+def _as_beside(v, both, always):
+    """The value of the other of two variables; unless ``always``, nan where it is neither 0 nor 1."""
+    (other,) = (w.value for w in both if w is not v)
+    return np.nan if other is None or not (always or other in (0.0, 1.0)) else other
 
 
 def _of_positive_parts(model, times) -> Iterator[tuple]:
