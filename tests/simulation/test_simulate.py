@@ -675,4 +675,5 @@ def test_a_start_near_a_surface(below, above, x0):
     m.sgn = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 0, m.dx[t] == below], [m.x[t] >= 0, m.dx[t] == above]])
     pyomo_fesd.simulate(transform(m, 10, 2))
     expected = (2 + min(x0, 0) / 3 + max(x0, 0)) if above > 0 else 0
-    assert m.x[2].value == pytest.approx(expected, abs=1e-9)
+    # a start nearer than 1e-7 may count as on the surface, which shifts the solution by less than that
+    assert m.x[2].value == pytest.approx(expected, abs=1e-7)
