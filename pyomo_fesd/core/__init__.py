@@ -9,7 +9,7 @@ done, ``interruption`` lets Ctrl-C wait where something would be, ``withheld_mes
 ``expression_key`` and ``phase`` are tools.  This room imports from no other.
 """
 
-from pyomo_fesd.core.boundary_laws import Hysteresis, StateJumps
+from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
 from pyomo_fesd.core.complementarity import Mixed, Pair, distance_to_bound, read_complementarity, read_side
 from pyomo_fesd.core.errors import FesdError
 from pyomo_fesd.core.evaluation import kept_values, known_sign, mutable_parameters, value_or_nan, value_or_zero
@@ -45,6 +45,7 @@ from pyomo_fesd.core.private_data import records_below, remember_records
 from pyomo_fesd.core.renamed import Renamed
 from pyomo_fesd.core.rollback import restored_on_error
 from pyomo_fesd.core.switched_systems import (
+    Contact,
     HysteresisMode,
     Reset,
     Step,

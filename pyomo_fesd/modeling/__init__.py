@@ -6,11 +6,12 @@ clock.py
     physical time as a state, for right-hand sides that depend on time
 signal.py, on time_series.py
     time series as inputs
-state_jump.py, projection.py
-    jumps of states and states confined to a set
+state_jump.py, projection.py, contact.py
+    jumps of states, states confined to a set, rigid bodies that touch
 """
 
 from pyomo_fesd.modeling.clock import clock
+from pyomo_fesd.modeling.contact import contact
 from pyomo_fesd.modeling.nonsmooth_functions import absolute, clip, maximum, minimum, positive_part
 from pyomo_fesd.modeling.projection import projection
 from pyomo_fesd.modeling.signal import signal

@@ -5,6 +5,7 @@ Does not apply: to inequalities of the user, which do not determine a simulation
 
 from collections import defaultdict
 from collections.abc import Container
+from dataclasses import replace
 from itertools import chain
 
 from pyomo.common.collections import ComponentSet
@@ -96,6 +97,14 @@ class EquationReader:
         points = {f.name: PointPairs.read(f, element) for f in self._moving.complementarities}
         chosen = [self._moving.r[n], *self._copies_of[n]]
         return self._equations(rows, event_functions, pairs, points, conditions, labels, chosen)
+
+    def boundary(self, b: int) -> ElementEquations:
+        """Return the laws of impact at boundary ``b``."""
+        jumps = self._moving.state_jumps
+        unknown = [*jumps.impacts.unknown(b), *self._copies_of[b + 1]]
+        rows = [*jumps.impacts.rows(b), *(jumps.copied[i] for i in jumps.copied if i[0] == b)]
+        pairs = [read_complementarity(c) for c in jumps.impacts.pairs(b)]
+        return replace(self._equations(rows, {}, pairs, {}, [], (), unknown), length=None)
 
     def _equations(self, constraints, event_functions, pairs, points, conditions, labels, chosen=()):
         """Assemble the record; ``chosen`` are unknowns whatever the equations contain, the length multiplier first."""
