@@ -53,6 +53,16 @@ class Impacts:
     balance: Constraint
     velocities: dict
 
+    @property
+    def drift(self) -> Var | None:
+        """mu of curved contacts."""
+        return self.block.component('drift')
+
+    @property
+    def closed(self) -> Constraint | None:
+        """The equations of mu."""
+        return self.block.component('closed')
+
     def active(self, n: int) -> list[str]:
         """Return the names of the contacts with an impact at the right boundary of element ``n``."""
         return [law.name for law in self.laws if self._size(law, n) > NO_IMPULSE * max(1.0, self._largest(law))]

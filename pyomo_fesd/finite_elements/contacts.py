@@ -27,7 +27,7 @@ from pyomo.core.expr.visitor import identify_variables, replace_expressions
 from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import FesdError, Impacts, MovingGrid, TimeIndex, all_switched_systems, strip_time, value_or_nan
+from pyomo_fesd.core import FesdError, Impacts, MovingGrid, TimeIndex, all_switched_systems, is_discretisation_equation, strip_time, value_or_nan
 from pyomo_fesd.finite_elements.impulse_balance import BoundaryEquations
 from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
 
@@ -99,6 +99,50 @@ def write_impacts(moving: MovingGrid) -> None:
     equations = BoundaryEquations(impacts.block.model(), TimeIndex(moving.wrt), labels)
     for element in elements:
         _write_boundary(moving, equations, element)
+
+
+def stabilise(moving: MovingGrid) -> None:
+    """Keep the order on curved contacts: in a closed element the normal velocity is 0 at the collocation points too (eq. 22).
+
+    Where the gap is linear in the positions, that follows from gap = 0.
+    """
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    curved = [] if impacts is None else [law for law in impacts.laws if _is_curved(law)]
+    if not curved:
+        return
+    block, times = impacts.block, TimeIndex(moving.wrt)
+    block.point = Set(initialize=range(1, len(moving.grid.tau) + 1))
+    block.drift = Var(block.contact, moving.block.element, block.point, initialize=0, dense=False)
+    block.closed = Constraint(block.contact, moving.block.element, block.point)
+    equations = BoundaryEquations(block.model(), times, {t for e in moving.grid.elements for t in e.points})
+    shifts = {}
+    for law in curved:
+        for element in moving.grid.elements:
+            _stabilise_element(block, law, element, equations, shifts)
+    _shift_positions(block.model(), shifts)
+
+
+def _is_curved(law):
+    # positions that are fixed, as at the first time, count as numbers
+    return any(gap.polynomial_degree() not in (0, 1) for gap in law.gaps.values())
+
+
+def _stabilise_element(block, law, element, equations, shifts):
+    gap = quicksum(law.gaps[t] for t in dict.fromkeys((element.left, *element.points)))
+    force = quicksum(law.normals[t] for t in element.points)
+    for r, t in enumerate(element.points, start=1):
+        drift = block.drift[law.name, element.n, r]
+        gamma = equations.normal_velocity(law.gaps[t], law.normals[t].parent_block(), ComponentSet())
+        block.closed.add((law.name, element.n, r), gap * drift + force * gamma == 0)
+        for xdot, slope in equations.gradient(law.gaps[t]):
+            shifts[id(xdot)] = shifts.get(id(xdot), xdot) + slope * drift
+
+
+def _shift_positions(model, shifts):
+    """Add the drifts to the rates of the positions, in the discretisation equations only."""
+    for equation in model.component_data_objects(Constraint, active=True, descend_into=Block):
+        if is_discretisation_equation(equation) and any(id(v) in shifts for v in identify_variables(equation.body)):
+            equation.set_value(replace_expressions(equation.expr, shifts))
 
 
 def _write_boundary(moving, equations, element):

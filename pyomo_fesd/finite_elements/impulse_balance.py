@@ -168,6 +168,11 @@ class BoundaryEquations:
                 rate += _slope(where, gap, x) * self._rate(self._derivatives[x], x)
         return rate
 
+    def gradient(self, gap) -> list[tuple]:
+        """Return the derivatives of the positions in a ``gap``, each with the slope of the gap in its position."""
+        positions = [x for x in ComponentSet(identify_variables(gap)) if x in self._derivatives]
+        return [(self._derivatives[x], _slope(x, gap, x)) for x in positions]
+
     def _rate(self, xdot, x):
         """The derivative of a position as a function of states."""
         equations = self._by_variable[id(xdot)]

@@ -32,7 +32,7 @@ from pyomo_fesd.core import (
     is_discretisation_equation,
     strip_time,
 )
-from pyomo_fesd.finite_elements.contacts import ContactLaw, declare_impacts, write_impacts
+from pyomo_fesd.finite_elements.contacts import ContactLaw, declare_impacts, stabilise, write_impacts
 
 
 @dataclass(frozen=True)
@@ -112,6 +112,7 @@ def add_state_jumps(moving: MovingGrid, laws: list[JumpLaw], contacts: list[Cont
     _add_after(moving)
     write_impacts(moving)
     _start_after(moving)
+    stabilise(moving)
 
 
 def _declare_jump_pairs(block, laws, inner):

@@ -62,6 +62,12 @@ class EquationReader:
                 self._rows_of[n + later].append(c)
             for (n, _), v in block.copy.items() if block is not None else ():
                 self._copies_of[n + later].append(v)
+        impacts = None if self._moving.state_jumps is None else self._moving.state_jumps.impacts
+        if impacts is not None and impacts.drift is not None:
+            for (_, n, _), v in impacts.drift.items():
+                self._copies_of[n].append(v)
+            for (_, n, _), c in impacts.closed.items():
+                self._rows_of[n].append(c)
 
     def _read_grid_rows(self):
         """Signs and left limits by label, signs after jumps by element."""
@@ -101,7 +107,7 @@ class EquationReader:
     def boundary(self, b: int) -> ElementEquations:
         """Return the laws of impact at boundary ``b``."""
         jumps = self._moving.state_jumps
-        unknown = [*jumps.impacts.unknown(b), *self._copies_of[b + 1]]
+        unknown = [*jumps.impacts.unknown(b), *(jumps.copy[i] for i in jumps.copy if i[0] == b)]
         rows = [*jumps.impacts.rows(b), *(jumps.copied[i] for i in jumps.copied if i[0] == b)]
         pairs = [read_complementarity(c) for c in jumps.impacts.pairs(b)]
         return replace(self._equations(rows, {}, pairs, {}, [], (), unknown), length=None)
