@@ -5,7 +5,7 @@ components switch; written before discretisation), ``moving_grid`` with ``bounda
 by ``fesd.finite_elements``) and ``homotopy_hints`` (for the solver; no time in it).  ``private_data`` keeps them on blocks,
 ``generated`` recognises generated blocks, ``renamed`` refuses words of earlier versions, ``rollback`` undoes what was left half
 done, ``interruption`` lets Ctrl-C wait where something would be, ``withheld_messages`` keeps back the messages of one thread,
-``turns`` lets threads wait for one another.  ``evaluation``, ``gradient``, ``interpolation``, ``positive_part``,
+``turns`` lets threads wait for one another.  ``evaluation``, ``gradient``, ``interpolation``, ``positive_part``, ``step``, ``smallest``,
 ``expression_key`` and ``phase`` are tools.  This room imports from no other.
 """
 
@@ -44,6 +44,8 @@ from pyomo_fesd.core.positive_part import add_positive_part, declare_positive_pa
 from pyomo_fesd.core.private_data import records_below, remember_records
 from pyomo_fesd.core.renamed import Renamed
 from pyomo_fesd.core.rollback import restored_on_error
+from pyomo_fesd.core.smallest import add_smallest, declare_smallest
+from pyomo_fesd.core.step import add_step, declare_step
 from pyomo_fesd.core.switched_systems import (
     Contact,
     HysteresisMode,

@@ -37,6 +37,14 @@ class Impacts:
         velocities after an impact where masses couple them
     balance : Constraint over (boundary, number)
         their equations
+    direction : Var over (boundary, number)
+        multipliers nu of the friction impulse, in place of those of the friction force
+    weights : Constraint over (boundary, number)
+        equations between these multipliers
+    slip : Complementarity over (condition, boundary)
+        the friction impulse is against the slip velocity after the impact
+    directions : dict boundary -> ComponentMap VarData -> VarData
+        multiplier nu at the boundary -> its ``direction``
     velocities : dict boundary -> list of VarData
         the states that jump, in the order of their values in ``StateJumps.after``
     """
@@ -51,6 +59,10 @@ class Impacts:
     impact: Complementarity
     velocity: Var
     balance: Constraint
+    direction: Var
+    weights: Constraint
+    slip: Complementarity
+    directions: dict
     velocities: dict
 
     @property
@@ -69,15 +81,15 @@ class Impacts:
 
     def unknown(self, b: int) -> list:
         """Return the variables of the laws at boundary ``b``."""
-        return [v for some in (self.impulse, self.above, self.below, self.leaving, self.velocity) for v in _at(some, b)]
+        return [v for some in (self.impulse, self.above, self.below, self.leaving, self.velocity, self.direction) for v in _at(some, b)]
 
     def rows(self, b: int) -> list:
         """Return the equations of the laws at boundary ``b``."""
-        return [*_at(self.parts, b), *_at(self.balance, b)]
+        return [*_at(self.parts, b), *_at(self.balance, b), *_at(self.weights, b)]
 
     def pairs(self, b: int) -> list:
         """Return the pairs of the laws at boundary ``b``."""
-        return _at(self.impact, b)
+        return [*_at(self.impact, b), *_at(self.slip, b)]
 
     def _size(self, law, n):
         return (self.impulse[law.name, n].value or 0.0) if (law.name, n) in self.impulse else 0.0
@@ -87,9 +99,8 @@ class Impacts:
 
 
 def _at(component, b):
-    """The data of a component over (contact, boundary, ...) or (boundary, number) at boundary ``b``."""
-    over = component.index_set().subsets()
-    place = next(k for k, s in enumerate(over) if s.local_name == 'left')
+    """The data of a component over (name, boundary, ...) or (boundary, number) at boundary ``b``."""
+    place = next(k for k, s in enumerate(component.index_set().subsets()) if s.local_name == 'left')
     return [data for index, data in component.items() if index[place] == b]
 
 

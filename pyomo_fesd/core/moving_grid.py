@@ -121,7 +121,7 @@ class MovingGrid(AutoSlots.Mixin):
         if self.state_jumps is not None:
             yield from (self.state_jumps.happens, self.state_jumps.binary)
             if self.state_jumps.impacts is not None:
-                yield self.state_jumps.impacts.impact
+                yield from (self.state_jumps.impacts.impact, self.state_jumps.impacts.slip)
 
     def element_length(self, element: Element):
         """Return h_n as an expression, in labels of the ContinuousSet."""

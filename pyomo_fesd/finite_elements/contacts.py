@@ -79,8 +79,11 @@ def declare_impacts(moving: MovingGrid, laws: list[ContactLaw], block: Block) ->
     block.velocity = Var(block.left, block.coupled, dense=False)
     block.balance, block.parts = Constraint(block.left, block.coupled), Constraint(block.contact, block.left, [1, 2])
     block.impact = Complementarity(block.contact, block.left, [1, 2])
+    block.direction, block.weights = Var(block.left, block.coupled, dense=False), Constraint(block.left, block.coupled)
+    block.slipping = Set(dimen=1)
+    block.slip = Complementarity(block.slipping, block.left)
     kept = (block.impulse, block.above, block.below, block.leaving, block.parts, block.impact, block.velocity, block.balance)
-    return Impacts(laws, block, *kept, {})
+    return Impacts(laws, block, *kept, block.direction, block.weights, block.slip, {}, {})
 
 
 def write_impacts(moving: MovingGrid) -> None:
@@ -149,8 +152,10 @@ def _write_boundary(moving, equations, element):
     impacts, label, b = moving.state_jumps.impacts, element.left, element.n - 1
     laws = [law for law in impacts.laws if label in law.gaps]
     impulses = ComponentMap((law.normals[label], impacts.impulse[law.name, b] if b else 0) for law in laws)
-    groups = equations.momentum(impulses)
-    after = ComponentMap()
+    groups, after = equations.momentum(impulses), ComponentMap()
+    impacts.directions[b] = directions = _directions(impacts, b, groups, equations) if b else ComponentMap()
+    swap = {id(nu): beta for nu, beta in directions.items()}
+    groups = [group.with_directions(swap) for group in groups]
     for group in groups if b else ():
         after.update(_velocities_after(impacts, b, group, impulses))
     impacts.velocities[b] = list(after)
@@ -162,6 +167,18 @@ def _write_boundary(moving, equations, element):
         _add_pairs(moving, law, element)
         if not b:
             _check_start(law, label, gamma)
+
+
+def _directions(impacts, b, groups, equations):
+    """A multiplier of the impulse for each multiplier of the friction forces in the balances."""
+    found = ComponentMap()
+    for nu in equations.multipliers(groups):
+        found[nu] = beta = impacts.direction[b, _place(impacts.block, len(found) + 1)]
+        beta.bounds, beta.value = (nu.lower, nu.upper), nu.value
+    for k, equation in enumerate(equations.between(found), start=1):
+        swap = {id(nu): beta for nu, beta in found.items()}
+        impacts.weights.add((b, _place(impacts.block, k)), replace_expressions(equation.expr, swap))
+    return found
 
 
 def _add_after(jumps, label, b, after):
@@ -239,6 +256,38 @@ def _check_start(law, label, gamma):
             "the first time",
             "start with the velocities after the impact, or a little earlier",
         )
+
+
+def add_friction_impulses(moving: MovingGrid, conditions: list[TimeComplementarity]) -> None:
+    """Add the pairs of friction impulses: those of the friction forces, with the slip velocities after the impact (eq. 23).
+
+    Raises
+    ------
+    FesdError
+        for directions of contact forces that depend on algebraic variables, or on slip velocities that do not follow from states
+    """
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    for element in moving.grid.elements[1:] if impacts is not None else ():
+        found = ComponentSet()
+        directions = impacts.directions[element.n - 1]
+        for condition in conditions if directions else ():
+            pair = condition.sides.get(element.left)
+            own = [] if pair is None else [v for v in identify_variables(pair[0]) if v in directions]
+            if own and condition.continuous[1]:
+                swap = {id(nu): directions[nu] for nu in own}
+                after = condition.starts.get(element.n, pair)[1]
+                impacts.block.slipping.add(condition.name)
+                impacts.slip.add(
+                    (condition.name, element.n - 1), complements(replace_expressions(pair[0], swap) >= 0, after >= 0)
+                )
+                found.update(own)
+        other = next((nu for nu in directions if nu not in found), None)
+        if other is not None:
+            raise FesdError(
+                other,
+                "contact: the direction of a contact force depends on it, and no law says its value at an impact",
+                "write directions as functions of positions, and slip velocities as functions of differential states",
+            )
 
 
 def with_departures(moving: MovingGrid, conditions: list[TimeComplementarity]) -> list[TimeComplementarity]:

@@ -12,8 +12,8 @@ Does not apply: to equations that are nonlinear in a derivative or in a force, a
 """
 
 from collections import defaultdict
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint
@@ -41,6 +41,18 @@ class Momentum:
     states: list
     masses: list
     forces: list
+
+    def with_directions(self, swap: dict) -> 'Momentum':
+        """Return the balances with other multipliers of friction: id of a variable -> the one in its place."""
+        if not swap:
+            return self
+        forces = [ComponentMap((f, replace_expressions(slope, swap)) for f, slope in row.items()) for row in self.forces]
+        return replace(self, forces=forces)
+
+    def coefficients(self) -> Iterator:
+        """Yield masses and directions."""
+        for row, forces in zip(self.masses, self.forces):
+            yield from (*row, *forces.values())
 
 
 class BoundaryEquations:
@@ -139,6 +151,16 @@ class BoundaryEquations:
                 "write masses and directions as functions of positions",
             )
         return found
+
+    def multipliers(self, groups: Iterable[Momentum]) -> ComponentSet:
+        """Return the variables in masses and directions that are neither states nor constant in time."""
+        found = (v for group in groups for slope in group.coefficients() for v in _variables(slope))
+        return ComponentSet(v for v in found if not self._is_known(v))
+
+    def between(self, variables) -> ComponentSet:
+        """Return the equations that contain these variables only."""
+        found = (c for v in variables for c in self._by_variable[id(v)])
+        return ComponentSet(c for c in found if all(v in variables for v in _variables(c.body)))
 
     def normal_velocity(self, gap, where, velocities: ComponentSet):
         """Return gamma, the rate of a ``gap``, as a function of states.

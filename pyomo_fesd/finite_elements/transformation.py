@@ -30,7 +30,7 @@ from pyomo_fesd.core import (
     write_at_further_times,
 )
 from pyomo_fesd.finite_elements.coincidences import add_coincidences
-from pyomo_fesd.finite_elements.contacts import read_contacts, with_departures
+from pyomo_fesd.finite_elements.contacts import add_friction_impulses, read_contacts, with_departures
 from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
 from pyomo_fesd.finite_elements.controls import check_controls, fix_given, hold_controls
 from pyomo_fesd.finite_elements.cross_complementarity import add_cross_complementarity
@@ -267,6 +267,7 @@ def _add_switching(moving, switching, complementarities, continuity, config):
     add_hysteresis(moving, switching.modes, limits)
     complementarities = with_mode_limits(moving, complementarities, continuity, config.piecewise_constant)
     warn_unknown(moving, complementarities)
+    add_friction_impulses(moving, complementarities)
     complementarities = with_departures(moving, complementarities)
     add_cross_complementarity(moving, complementarities, config.cross_complementarity)
     if not switching:

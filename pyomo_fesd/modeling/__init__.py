@@ -6,12 +6,15 @@ clock.py
     physical time as a state, for right-hand sides that depend on time
 signal.py, on time_series.py
     time series as inputs
-state_jump.py, projection.py, contact.py
-    jumps of states, states confined to a set, rigid bodies that touch
+state_jump.py, projection.py
+    jumps of states, states confined to a set
+contact.py, friction.py
+    rigid bodies that touch, dry friction of any force law
 """
 
 from pyomo_fesd.modeling.clock import clock
 from pyomo_fesd.modeling.contact import contact
+from pyomo_fesd.modeling.friction import friction
 from pyomo_fesd.modeling.nonsmooth_functions import absolute, clip, maximum, minimum, positive_part
 from pyomo_fesd.modeling.projection import projection
 from pyomo_fesd.modeling.signal import signal

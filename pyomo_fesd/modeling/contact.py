@@ -1,6 +1,6 @@
-"""Rigid contacts: the distance of two bodies, and the force that keeps it from becoming negative.
+"""Rigid contacts: the distance of two bodies, the force that keeps it from becoming negative, and dry friction.
 
-    0 <= normal  perp  gap >= 0
+    0 <= normal  perp  gap >= 0,      |friction| <= mu normal, against the slip velocity
 
 At an impact the force is an impulse.  Velocities jump by it, and ``fesd.finite_elements`` puts an element boundary there
 (theory, eq. 20 and 21).
@@ -8,12 +8,14 @@ At an impact the force is an impulse.  Velocities jump by it, and ``fesd.finite_
 
 from pyomo.core import Block, Expression, Var, value
 from pyomo.core.expr.visitor import identify_variables
+from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import Contact, FesdError, switched_systems
+from pyomo_fesd.modeling.friction import add_friction
 
 
-def contact(*sets, gap, restitution=0) -> Block:
+def contact(*sets, gap, restitution=0, friction=None, slip=None, directions: int = 8) -> Block:
     """Return a Block over ``sets`` with a rigid contact: a gap that is never negative, and the force ``normal`` that keeps it so.
 
     Add ``normal`` to the balances of momentum on which the force acts, with the direction in which it acts on each, as you would
@@ -31,17 +33,34 @@ def contact(*sets, gap, restitution=0) -> Block:
     restitution : number, Param, or function (block, index, ...) -> one of them
         e between 0 (the bodies stay together) and 1 (no energy is lost): normal velocity after an impact = -e times that before
 
+    friction : number, Param, or function (block, index, ...) -> one of them or an expression, optional
+        mu; the Block then has the force ``friction`` too, which belongs in the balances like ``normal``.  At an impact it is an
+        impulse against the slip velocity after it.
+    slip : function (block, index, ...) -> expression, or list of two
+        velocity of one body along the other, written with differential states, in the direction in which ``friction`` acts in the
+        balances; two components in space, where ``friction[1]`` and ``friction[2]`` are those of the force
+    directions : int
+        corners of the polygon of friction forces in space (:func:`friction`)
+
     Raises
     ------
     FesdError
-        when the Block is added: for a gap that is not an expression, and a restitution that is not between 0 and 1
+        when the Block is added: for a gap that is not an expression, a restitution that is not between 0 and 1, a negative
+        friction coefficient, and a slip without friction or the other way round
 
     Example
     -------
     A ball on a floor: ``m.floor = contact(m.t, gap=lambda m, t: m.y[t] - radius, restitution=0.8)``
 
+    With friction: ``contact(m.t, gap=..., friction=0.3, slip=lambda m, t: m.vx[t] + radius * m.omega[t])``, and
+    ``mass * m.dvx[t] == m.floor[t].friction``, ``inertia * m.domega[t] == radius * m.floor[t].friction``.
+
     Source: Nurkanovic, Frey, Pozharskiy, Diehl (2024), FESD-J.
     """
+
+    if (friction is None) != (slip is None):
+        raise FesdError('contact', "friction and slip belong together, and one of them was not given", "give both, or none")
+    time = next((s for s in sets if getattr(s, 'ctype', None) is ContinuousSet), None)
 
     def rule(block, *index):
         parent = block.parent_block()
@@ -50,6 +69,9 @@ def contact(*sets, gap, restitution=0) -> Block:
         block.touching = Complementarity(expr=complements(block.normal >= 0, block.gap >= 0))
         e = _restitution(block, restitution(parent, *index) if callable(restitution) else restitution)
         switched_systems(block).contacts.append(Contact(block, block.gap, block.normal, block.touching, e))
+        if friction is not None:
+            mu = _coefficient(block, friction(parent, *index) if callable(friction) else friction)
+            add_friction(block, 'friction', slip(parent, *index), mu * block.normal, directions, time)
 
     return Block(*sets, rule=rule)
 
@@ -65,6 +87,12 @@ def _restitution(block, given):
         raise FesdError(block, f"its restitution is '{given}', not a number or Param", "give e.g. 0.8")
     if not 0 <= value(given) <= 1:
         raise FesdError(block, f"its restitution is {value(given):g}", "give a number between 0 and 1")
+    return given
+
+
+def _coefficient(block, given):
+    if not _is_numeric(given) or (isinstance(given, (int, float)) and given < 0):
+        raise FesdError(block, f"its friction is '{given}', not a coefficient >= 0", "give e.g. 0.3")
     return given
 
 

@@ -36,7 +36,7 @@ class ElementSolver:
         self._moving = moving_grids(model)[wrt]
         self._grid, self._hysteresis = self._moving.grid, read_hysteresis(self._moving)
         self._jumps = JumpEvents(self._moving.state_jumps)
-        self._impacts = ImpactEvents(self._moving.state_jumps, self._solve_impact)
+        self._impacts = ImpactEvents(self._moving.state_jumps, self._times, self._solve_impact)
         given = given_variables(model, self._times, inputs, self._moving.held)
         given.update(v for some in self._hysteresis for e in self._grid.elements for v in some.variables(e.right))
         self._reader = EquationReader(model, self._moving, self._times, given)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pyomo.core import value
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import Impacts, StateJumps
+from pyomo_fesd.core import Impacts, StateJumps, TimeIndex
 from pyomo_fesd.simulation.events import ZeroArrivals
 
 #: A contact opens after an impact with more than this part of the normal velocity before it.
@@ -23,19 +23,20 @@ class ImpactEvents:
     Parameters
     ----------
     state_jumps : StateJumps or None
+    times : TimeIndex
     solve : function of a boundary
         solves the laws of impact there and writes the values
     """
 
-    def __init__(self, state_jumps: StateJumps | None, solve: Callable[[int], None]):
+    def __init__(self, state_jumps: StateJumps | None, times: TimeIndex, solve: Callable[[int], None]):
         self._state_jumps = state_jumps
         self._impacts: Impacts | None = None if state_jumps is None else state_jumps.impacts
         self._laws = [] if self._impacts is None else self._impacts.laws
-        self._solve, self._arrivals, self._arrived = solve, ZeroArrivals(), {}
+        self._times, self._solve, self._arrivals, self._arrived, self._collided = times, solve, ZeroArrivals(), {}, False
 
     def begin(self) -> None:
         """Begin without an impact."""
-        self._arrivals = ZeroArrivals()
+        self._arrivals, self._collided = ZeroArrivals(), False
         for law in self._laws:
             positions = identify_variables(next(iter(law.gaps.values())), include_fixed=True)
             self._arrivals.at_least(law.name, ROUND_OFF * (max(abs(v.value or 0.0) for v in positions) or 1.0))
@@ -48,6 +49,7 @@ class ImpactEvents:
 
     def find_arrivals(self, element) -> list[int]:
         """Return the positions at which gaps have closed."""
+        self._follow_direction(element)
         labels = (element.left, *element.own_labels)
         self._arrived = {law.name: self._arrivals.first(law.name, [value(law.gaps[t]) for t in labels]) for law in self._laws}
         return [position for position in self._arrived.values() if position is not None]
@@ -58,9 +60,16 @@ class ImpactEvents:
             return []
         collide = sorted(name for name, position in self._arrived.items() if position == len(element.own_labels))
         self._without_impulse(element.n)
+        self._collided = bool(collide)
         if collide:
             self._solve(element.n)
         return collide
+
+    def _follow_direction(self, element):
+        """Without an impulse at the left boundary, its direction is that of the friction force in ``element``."""
+        if self._laws and not self._collided:
+            for nu, beta in self._impacts.directions[element.n - 1].items():
+                beta.set_value(self._times.at(nu, element.points[0]).value, skip_validation=True)
 
     def closed(self, element) -> dict[str, bool]:
         """Return for each contact that touches at the right boundary of ``element`` whether it stays closed after it, by label."""
