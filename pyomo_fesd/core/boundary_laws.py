@@ -1,13 +1,14 @@
 """The records of the laws at element boundaries: state jumps, impacts and hysteresis."""
 
+from collections.abc import Container
 from dataclasses import dataclass
 
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Constraint, Expression, Var
 from pyomo.mpec import Complementarity
 
+from pyomo_fesd.core.complementarity import Pair
 from pyomo_fesd.core.grid import Element
-
 
 #: An impulse below this number, or this part of the largest one of its contact, is none.
 NO_IMPULSE = 1e-7
@@ -79,17 +80,22 @@ class Impacts:
         """Return the names of the contacts with an impact at the right boundary of element ``n``."""
         return [law.name for law in self.laws if self._size(law, n) > NO_IMPULSE * max(1.0, self._largest(law))]
 
-    def unknown(self, b: int) -> list:
-        """Return the variables of the laws at boundary ``b``."""
-        return [v for some in (self.impulse, self.above, self.below, self.leaving, self.velocity, self.direction) for v in _at(some, b)]
+    def unknown(self, b: int, closed: Container[str]) -> list:
+        """Return the variables of the laws at boundary ``b`` that the ``closed`` contacts determine, with N = 0."""
+        parts = [v for some in (self.impulse, self.above, self.leaving) for v in _at(some, b, closed)]
+        return [*parts, *_at(self.velocity, b), *_at(self.direction, b)]
 
-    def rows(self, b: int) -> list:
-        """Return the equations of the laws at boundary ``b``."""
-        return [*_at(self.parts, b), *_at(self.balance, b), *_at(self.weights, b)]
+    def rows(self, b: int, closed: Container[str]) -> list:
+        """Return the equations of the laws at boundary ``b`` for the ``closed`` contacts."""
+        return [*_at(self.parts, b, closed), *_at(self.balance, b), *_at(self.weights, b)]
 
-    def pairs(self, b: int) -> list:
-        """Return the pairs of the laws at boundary ``b``."""
-        return [*_at(self.impact, b), *_at(self.slip, b)]
+    def closed_pairs(self, b: int, closed: Container[str]) -> list[Pair]:
+        """Return the law of restitution at boundary ``b`` for each of the ``closed`` contacts, 0 <= Lambda perp P >= 0."""
+        return [Pair(v, self.above[v.index()]) for v in _at(self.impulse, b, closed)]
+
+    def slip_pairs(self, b: int) -> list:
+        """Return the pairs of friction impulses at boundary ``b``."""
+        return _at(self.slip, b)
 
     def _size(self, law, n):
         return (self.impulse[law.name, n].value or 0.0) if (law.name, n) in self.impulse else 0.0
@@ -98,10 +104,10 @@ class Impacts:
         return max((self._size(law, n) for name, n in self.impulse if name == law.name), default=0.0)
 
 
-def _at(component, b):
-    """The data of a component over (name, boundary, ...) or (boundary, number) at boundary ``b``."""
+def _at(component, b, among=None):
+    """The data of a component over (name, boundary, ...) or (boundary, number) at boundary ``b``, of some names only."""
     place = next(k for k, s in enumerate(component.index_set().subsets()) if s.local_name == 'left')
-    return [data for index, data in component.items() if index[place] == b]
+    return [data for index, data in component.items() if index[place] == b and (among is None or index[0] in among)]
 
 
 @dataclass(frozen=True)

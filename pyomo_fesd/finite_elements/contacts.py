@@ -27,12 +27,23 @@ from pyomo.core.expr.visitor import identify_variables, replace_expressions
 from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import FesdError, Impacts, MovingGrid, TimeIndex, all_switched_systems, is_discretisation_equation, strip_time, value_or_nan
+from pyomo_fesd.core import (
+    FesdError,
+    Impacts,
+    MovingGrid,
+    TimeIndex,
+    all_switched_systems,
+    is_discretisation_equation,
+    strip_time,
+    value_or_nan,
+)
 from pyomo_fesd.finite_elements.impulse_balance import BoundaryEquations
 from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
 
 #: sigma: bodies that would meet before this part of an element are in contact.
 AHEAD = 0.01
+#: Keeps the drift 0 where gap and force are both 0.
+NOWHERE = 1e-12
 #: Largest approach of bodies that touch at the first time.
 APPROACH = 1e-8
 
@@ -136,7 +147,8 @@ def _stabilise_element(block, law, element, equations, shifts):
     for r, t in enumerate(element.points, start=1):
         drift = block.drift[law.name, element.n, r]
         gamma = equations.normal_velocity(law.gaps[t], law.normals[t].parent_block(), ComponentSet())
-        block.closed.add((law.name, element.n, r), gap * drift + force * gamma == 0)
+        # the opposite sign of gamma would allow a drift that keeps the gap closed while the bodies approach, where both are small
+        block.closed.add((law.name, element.n, r), ((gap + NOWHERE) * drift - force * gamma) / (gap + force + NOWHERE) == 0)
         for xdot, slope in equations.gradient(law.gaps[t]):
             shifts[id(xdot)] = shifts.get(id(xdot), xdot) + slope * drift
 
@@ -231,7 +243,7 @@ def _is_zero(restitution):
 
 def _departure(impacts, law, b):
     """Q: the velocity with which bodies part after the boundary, or 0."""
-    return impacts.leaving[law.name, b] if (law.name, b, 2) in impacts.parts else impacts.above[law.name, b]
+    return impacts.leaving[law.name, b] if (law.name, b) in impacts.leaving else impacts.above[law.name, b]
 
 
 def _add_pairs(moving, law, element):
@@ -277,9 +289,7 @@ def add_friction_impulses(moving: MovingGrid, conditions: list[TimeComplementari
                 swap = {id(nu): directions[nu] for nu in own}
                 after = condition.starts.get(element.n, pair)[1]
                 impacts.block.slipping.add(condition.name)
-                impacts.slip.add(
-                    (condition.name, element.n - 1), complements(replace_expressions(pair[0], swap) >= 0, after >= 0)
-                )
+                impacts.slip.add((condition.name, element.n - 1), complements(replace_expressions(pair[0], swap) >= 0, after >= 0))
                 found.update(own)
         other = next((nu for nu in directions if nu not in found), None)
         if other is not None:

@@ -67,13 +67,19 @@ def contact(*sets, gap, restitution=0, friction=None, slip=None, directions: int
         block.gap = Expression(expr=_gap(block, gap(parent, *index)))
         block.normal = Var(bounds=(0, None), initialize=0)
         block.touching = Complementarity(expr=complements(block.normal >= 0, block.gap >= 0))
-        e = _restitution(block, restitution(parent, *index) if callable(restitution) else restitution)
+        e = _restitution(block, _given(restitution, parent, index))
         switched_systems(block).contacts.append(Contact(block, block.gap, block.normal, block.touching, e))
         if friction is not None:
-            mu = _coefficient(block, friction(parent, *index) if callable(friction) else friction)
+            mu = _coefficient(block, _given(friction, parent, index))
             add_friction(block, 'friction', slip(parent, *index), mu * block.normal, directions, time)
 
     return Block(*sets, rule=rule)
+
+
+def _given(given, parent, index):
+    """The value of a rule, or what was given in its place."""
+    # Params are callable too
+    return given if hasattr(given, 'is_expression_type') or not callable(given) else given(parent, *index)
 
 
 def _gap(block, given):

@@ -110,9 +110,9 @@ class ElementSolver:
             self._end = replace(self._end, values=None)
         return events
 
-    def _solve_impact(self, b):
+    def _solve_impact(self, b, closed):
         """Solve the laws of impact at boundary b."""
-        equations = self._reader.boundary(b)
+        equations = self._reader.boundary(b, closed)
         impact = self._class(equations, None, (1.0,))
         answer = impact.mpcc.solve(equations)
         self._progress.check_time()

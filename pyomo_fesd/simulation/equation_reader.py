@@ -104,13 +104,13 @@ class EquationReader:
         chosen = [self._moving.r[n], *self._copies_of[n]]
         return self._equations(rows, event_functions, pairs, points, conditions, labels, chosen)
 
-    def boundary(self, b: int) -> ElementEquations:
-        """Return the laws of impact at boundary ``b``."""
+    def boundary(self, b: int, closed: Container[str]) -> ElementEquations:
+        """Return the laws of impact at boundary ``b`` for the ``closed`` contacts, whose gaps are taken for zero."""
         jumps = self._moving.state_jumps
-        unknown = [*jumps.impacts.unknown(b), *(jumps.copy[i] for i in jumps.copy if i[0] == b)]
-        rows = [*jumps.impacts.rows(b), *(jumps.copied[i] for i in jumps.copied if i[0] == b)]
-        pairs = [read_complementarity(c) for c in jumps.impacts.pairs(b)]
-        return replace(self._equations(rows, {}, pairs, {}, [], (), unknown), length=None)
+        copies, copied = ([found[i] for i in found if i[0] == b] for found in (jumps.copy, jumps.copied))
+        pairs = [*jumps.impacts.closed_pairs(b, closed), *map(read_complementarity, jumps.impacts.slip_pairs(b))]
+        rows = [*jumps.impacts.rows(b, closed), *copied]
+        return replace(self._equations(rows, {}, pairs, {}, [], (), [*jumps.impacts.unknown(b, closed), *copies]), length=None)
 
     def _equations(self, constraints, event_functions, pairs, points, conditions, labels, chosen=()):
         """Assemble the record; ``chosen`` are unknowns whatever the equations contain, the length multiplier first."""
