@@ -5,7 +5,8 @@ components switch; written before discretisation), ``moving_grid`` with ``bounda
 by ``fesd.finite_elements``) and ``homotopy_hints`` (for the solver; no time in it).  ``private_data`` keeps them on blocks,
 ``generated`` recognises generated blocks, ``renamed`` refuses words of earlier versions, ``rollback`` undoes what was left half
 done, ``interruption`` lets Ctrl-C wait where something would be, ``withheld_messages`` keeps back the messages of one thread,
-``turns`` lets threads wait for one another.  ``evaluation``, ``gradient``, ``interpolation``, ``positive_part``, ``step``, ``smallest``,
+``turns`` lets threads wait for one another.  ``evaluation``, ``gradient``, ``interpolation``, ``positive_part``,
+``step``, ``smallest``,
 ``expression_key`` and ``phase`` are tools.  This room imports from no other.
 """
 

@@ -1,4 +1,4 @@
-"""The step function of an expression c, from which the Heaviside form, all functions that jump and friction in the plane are made (theory, eq. 5).
+"""The step function of an expression c: the Heaviside form, functions that jump and friction are made of it (theory, eq. 5).
 
     c = p - n,    0 <= alpha  perp  n >= 0,    0 <= 1 - alpha  perp  p >= 0
 

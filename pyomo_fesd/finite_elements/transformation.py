@@ -62,7 +62,7 @@ from pyomo_fesd.finite_elements.untaken_kinks import warn_untaken_kinks
 
 @dataclass
 class _Switching:
-    """All that switches over time: pairs and mixed conditions (name -> {time: data}), modes with hysteresis, state jumps, contacts."""
+    """All that switches over time: pairs and mixed conditions (name -> {time: data}), and laws of modes, jumps and contacts."""
 
     pairs: dict
     mixed: dict

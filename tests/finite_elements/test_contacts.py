@@ -206,12 +206,17 @@ def test_friction_in_space(height):
     # a puck that moves in a direction of the polygon stops on a straight line
     m = over_time(1.2, x=0.0, y=0.0, z=height, u=1.2, v=1.6, w=0.0)
     turn = np.arctan2(1.6, 1.2)
-    along = lambda m, t: [cos(turn) * m.u[t] + sin(turn) * m.v[t], cos(turn) * m.v[t] - sin(turn) * m.u[t]]
+
+    def along(m, t):
+        return [cos(turn) * m.u[t] + sin(turn) * m.v[t], cos(turn) * m.v[t] - sin(turn) * m.u[t]]
+
+    def force(m, t):
+        return m.ice[t].friction
+
     m.ice = pyomo_fesd.contact(m.t, gap=lambda m, t: m.z[t], friction=0.25, slip=along, directions=4)
     for x, v in (('x', 'u'), ('y', 'v'), ('z', 'w')):
         rate, v = m.component(f'd{x}'), m.component(v)
         m.add_component(f'way_{x}', pyo.Constraint(m.t, rule=lambda m, t, rate=rate, v=v: rate[t] == v[t]))
-    force = lambda m, t: m.ice[t].friction
     m.push_x = pyo.Constraint(m.t, rule=lambda m, t: m.du[t] == cos(turn) * force(m, t)[1] - sin(turn) * force(m, t)[2])
     m.push_y = pyo.Constraint(m.t, rule=lambda m, t: m.dv[t] == sin(turn) * force(m, t)[1] + cos(turn) * force(m, t)[2])
     m.press = pyo.Constraint(m.t, rule=lambda m, t: m.dw[t] == -G + m.ice[t].normal)
