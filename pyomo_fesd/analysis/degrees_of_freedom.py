@@ -25,7 +25,7 @@ from pyomo.mpec import Complementarity
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
-from pyomo_fesd.core import TimeIndex, all_switched_systems, moving_grids, read_complementarity
+from pyomo_fesd.core import TimeIndex, all_switched_systems, moving_grids, read_complementarity, refuse_no_model
 
 INDEX = re.compile(r'\[[^\]]*\]')
 #: Number of names that a message lists.
@@ -95,6 +95,7 @@ def structure(block) -> Structure:
     Structure
         prints as two lines; ``problem`` is empty for a sound model
     """
+    refuse_no_model(block, 'structure')
     given = _Given(block)
     unknowns, equations, rows = ComponentMap(), [], []
     for equation, expressions in _equations(block, given):

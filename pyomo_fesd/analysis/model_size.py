@@ -11,7 +11,7 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import Mixed, all_hints, is_generated, moving_grids, read_complementarity
+from pyomo_fesd.core import Mixed, all_hints, is_generated, moving_grids, read_complementarity, refuse_no_model
 
 
 class Report(dict):
@@ -42,6 +42,7 @@ def report(model, blocks: bool = False) -> Report | pd.DataFrame:
         conditions over time that the pairs are made from; one between two bounds counts twice), ``disjunctions`` (transformed)
         and ``modes left out`` (switched-off disjuncts, which leave no multiplier)
     """
+    refuse_no_model(model, 'report')
     return _by_block(model) if blocks else Report(_seen_by_solver(model) | _transformed_parts(model))
 
 

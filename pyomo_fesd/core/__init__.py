@@ -3,7 +3,8 @@
 Read first ``errors``, ``time_index``, ``grid`` and ``complementarity``, then the records: ``switched_systems`` (which
 components switch; written before discretisation), ``moving_grid`` with ``boundary_laws`` (elements of variable length; written
 by ``fesd.finite_elements``) and ``homotopy_hints`` (for the solver; no time in it).  ``private_data`` keeps them on blocks,
-``generated`` recognises generated blocks, ``renamed`` refuses words of earlier versions, ``rollback`` undoes what was left half
+``generated`` recognises generated blocks, ``keywords`` refuses values outside of their domains, ``renamed`` words of earlier
+versions, ``rollback`` undoes what was left half
 done, ``interruption`` lets Ctrl-C wait where something would be, ``withheld_messages`` keeps back the messages of one thread,
 ``turns`` lets threads wait for one another.  ``evaluation``, ``gradient``, ``interpolation``, ``positive_part``,
 ``step``, ``smallest``,
@@ -27,18 +28,23 @@ from pyomo_fesd.core.grid import (
     share_elements,
 )
 from pyomo_fesd.core.homotopy_hints import (
+    Arrival,
     BranchConstraint,
     Change,
     Coincidence,
     Follower,
     HomotopyHints,
     NeighbourBranch,
+    Option,
     Penalty,
+    Place,
+    Toggle,
     all_hints,
     homotopy_hints,
 )
 from pyomo_fesd.core.interpolation import interpolation_weights
 from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible
+from pyomo_fesd.core.keywords import check_keywords, read_keywords
 from pyomo_fesd.core.moving_grid import MovingGrid, Split, moving_grids
 from pyomo_fesd.core.phase import phase
 from pyomo_fesd.core.positive_part import add_positive_part, declare_positive_part

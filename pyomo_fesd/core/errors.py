@@ -19,3 +19,7 @@ class FesdError(PyomoException):
     def __reduce__(self):
         # by default an exception is pickled with its message alone, from which it cannot be made again
         return type(self), (self.component, self.cause, self.fix)
+
+
+class KeywordError(FesdError, ValueError):
+    """A keyword that is unknown, or has a value that it cannot have; a ValueError too, as in Pyomo."""

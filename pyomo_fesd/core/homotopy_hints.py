@@ -109,6 +109,93 @@ class Coincidence:
 
 
 @dataclass(frozen=True, eq=False)
+class Place:
+    """A place in a row of places between which changes happen; the first one of a row has an end of it on its other side.
+
+    Attributes
+    ----------
+    extent : VarData
+    inside, between : tuple of (ComplementarityData, ComplementarityData or None)
+        pairs of the place, and pairs of the boundary towards the end.  If everything moves inwards by one place, the first pair
+        takes the zero side that the second one has; with None its first side becomes zero
+    """
+
+    extent: VarData
+    inside: tuple[tuple[ComplementarityData, ComplementarityData | None], ...] = ()
+    between: tuple[tuple[ComplementarityData, ComplementarityData | None], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Toggle:
+    """Pairs of the places at an end that have the same side at zero, and may have the other one beyond a change.
+
+    Attributes
+    ----------
+    pairs : tuple of ComplementarityData
+    first, second : NumericValue or None
+        the sides at the end; None for one that may jump there
+    with_them : tuple of (ComplementarityData, bool)
+        pairs that get the same side as these, and whether their sides are swapped
+    """
+
+    pairs: tuple[ComplementarityData, ...]
+    first: object
+    second: object
+    with_them: tuple[tuple[ComplementarityData, bool], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Option:
+    """A change that is possible at an end of a row of places.
+
+    Attributes
+    ----------
+    gauges : tuple of NumericValue
+        all zero where it is possible
+    requires : tuple of (ComplementarityData, int)
+        with the number (0 or 1) of the side that is zero in such a solution
+    sides : tuple of (ComplementarityData, int)
+        the zero sides where the change has come in, after everything else has moved inwards
+    either : tuple of ComplementarityData
+        pairs of which any side may be zero then
+    """
+
+    gauges: tuple
+    requires: tuple[tuple[ComplementarityData, int], ...]
+    sides: tuple[tuple[ComplementarityData, int], ...]
+    either: tuple[ComplementarityData, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Arrival:
+    """Changes that a solution may have exactly at an end of a row of places, where it does not show them.
+
+    The branches with and without such a change in the row meet in the solution, but the place beyond the change has no extent, so
+    no small step leads there: a certificate looks at each.
+
+    Attributes
+    ----------
+    row : tuple of Place
+        from the end inwards, as far as changes can move
+    toggles : tuple of Toggle
+        pairs of one system: some of them change together
+    options : tuple of Option
+    opposite : tuple of Place
+        the row on the other side of an end between two rows, from there inwards: changes come in on both sides
+    """
+
+    row: tuple[Place, ...]
+    toggles: tuple[Toggle, ...] = ()
+    options: tuple[Option, ...] = ()
+    opposite: tuple[Place, ...] = ()
+
+    def gauges(self) -> list:
+        """Return all expressions whose values tell which changes are at the end."""
+        of_toggles = [side for toggle in self.toggles for side in (toggle.first, toggle.second) if side is not None]
+        return of_toggles + [gauge for option in self.options for gauge in option.gauges]
+
+
+@dataclass(frozen=True, eq=False)
 class Follower:
     """A pair that has a solution wherever another one, its leader, is solved with the same side at zero.
 
@@ -138,12 +225,22 @@ class HomotopyHints(AutoSlots.Mixin):
         certificate also asks for descent beyond them.
     neighbour_branches : list of NeighbourBranch
     coincidences : list of Coincidence
+    arrivals : list of Arrival
     followers : list of Follower
     alike : list of tuples of VarData
         variables that are the same quantity at different places, and have one size
     """
 
-    __slots__ = ('branch_constraints', 'penalties', 'guide_bounds', 'neighbour_branches', 'coincidences', 'followers', 'alike')
+    __slots__ = (
+        'branch_constraints',
+        'penalties',
+        'guide_bounds',
+        'neighbour_branches',
+        'coincidences',
+        'arrivals',
+        'followers',
+        'alike',
+    )
 
     def __init__(self):
         self.branch_constraints = []
@@ -151,6 +248,7 @@ class HomotopyHints(AutoSlots.Mixin):
         self.guide_bounds = ComponentMap()
         self.neighbour_branches = []
         self.coincidences = []
+        self.arrivals = []
         self.alike = []
         self.followers = []
 
@@ -201,6 +299,7 @@ def all_hints(model: Block) -> HomotopyHints:
         total.guide_bounds.update(hints.guide_bounds)
         total.neighbour_branches += hints.neighbour_branches
         total.coincidences += hints.coincidences
+        total.arrivals += hints.arrivals
         total.alike += hints.alike
         total.followers += hints.followers
     return total

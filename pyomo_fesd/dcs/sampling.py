@@ -6,10 +6,13 @@ from math import isfinite
 
 from pyomo.core.expr.visitor import identify_variables
 
+#: A start value below this is left from a computation; powers of it vanish.
+NOTHING = 1e-100
+
 
 def start_of(v, default: float = 1.0) -> float:
-    """Return the value of a variable; ``default`` where it has none that is finite, or is 0."""
-    return float(v.value) if v.value and isfinite(v.value) else default
+    """Return the value of a variable; ``default`` where it has none that is finite, or is as good as 0."""
+    return float(v.value) if v.value and isfinite(v.value) and abs(v.value) > NOTHING else default
 
 
 @contextmanager

@@ -5,7 +5,16 @@ from pyomo.common.config import ConfigDict, ConfigValue, In, document_class_CONF
 from pyomo.core import Transformation, TransformationFactory, Var
 from pyomo.core.util import target_list
 
-from pyomo_fesd.core import TRANSFORMATION, FesdError, Renamed, add_writer, find_continuous_set, restored_on_error, switched_systems
+from pyomo_fesd.core import (
+    TRANSFORMATION,
+    FesdError,
+    Renamed,
+    add_writer,
+    find_continuous_set,
+    read_keywords,
+    restored_on_error,
+    switched_systems,
+)
 from pyomo_fesd.dcs.piecewise import replacement_of
 from pyomo_fesd.dcs.reading import enclosing_disjunct
 from pyomo_fesd.dcs.source_maps import replaced_components, source_maps
@@ -89,8 +98,7 @@ class DynamicComplementaritySystem(Transformation):
 
     def _apply_to(self, instance, **kwds):
         RENAMED.refuse(kwds)
-        config = self.CONFIG(kwds.pop('options', {}))
-        config.set_value(kwds)
+        config = read_keywords(self.CONFIG, kwds, 'fesd.dcs')
         _refuse_other_than_vars(config.defines)
         wrt = find_continuous_set(instance, config.wrt, 'fesd.dcs')
         writer = DcsWriter(instance, wrt, config.targets, config.form, config.hysteresis, config.defines)

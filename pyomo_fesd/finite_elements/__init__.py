@@ -9,11 +9,13 @@ The transformation reads the switched systems that other transformations recorde
 - ``time_complementarities``, ``mixed_complementarity``, ``continuity``, ``algebraic_graph``: conditions and their continuity
 - ``cross_complementarity``, ``state_jumps``, ``hysteresis``, ``right_limits``, ``mode_limits``, ``relations``: the laws of
   switching
-- ``equilibration``, ``sliding_exit``, ``neighbour_branches``, ``coincidences``: the lengths, and hints for the homotopy
-- ``given_inputs``, ``explicit_time``, ``untaken_kinks``, ``spatial_sets``: inputs, warnings and refusals
+- ``equilibration``, ``sliding_exit``, ``neighbour_branches``, ``coincidences``, ``arrivals``: the lengths, and hints for the
+  homotopy
+- ``given_inputs``, ``explicit_time``, ``untaken_kinks``, ``spatial_sets``, ``first_mode``: inputs, warnings and refusals
 """
 
 from pyomo_fesd.finite_elements import transformation
 from pyomo_fesd.finite_elements.equilibration import TINY
+from pyomo_fesd.finite_elements.first_mode import refuse_first_mode, refuse_first_modes
 from pyomo_fesd.finite_elements.hysteresis import LEFT, RIGHT
 from pyomo_fesd.finite_elements.lengths import LEAST

@@ -10,6 +10,8 @@ Leaves: a start value where there was none; ``lengths`` applies the factors.
 Does not apply: to models that are scaled by hand, dx == T f; their labels do not change.
 """
 
+from math import inf
+
 from pyomo.core import Var
 from pyomo.dae import ContinuousSet
 
@@ -45,7 +47,7 @@ def _check_length_variable(length, keyword, wrt):
         raise FesdError(length, f"{keyword}: it belongs to another model than '{wrt.name}'", "give a Var of the model itself")
     if TimeIndex(wrt).time(length) is not None:
         raise FesdError(length, f"{keyword}: it is a variable at one time", "give a Var that is not indexed by time")
-    if length.fixed and not (length.value is not None and length.value > 0):
+    if length.fixed and not (length.value is not None and 0 < length.value < inf):
         raise FesdError(length, f"{keyword}: it is fixed to {length.value}", "fix it to a positive length of time")
     if not length.fixed and not (length.lb is not None and length.lb > 0):
         raise FesdError(

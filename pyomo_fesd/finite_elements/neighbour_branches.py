@@ -67,6 +67,18 @@ class PairsByPlace:
             *_matching(self._of_boundaries, before.n, before.n - step),
         ]
 
+    def inwards(self, element: Element, step: int) -> tuple[list[tuple], list[tuple]]:
+        """Return pairs with sources for an element, and for its boundary towards the end, to take over what lies one place on.
+
+        Parameters
+        ----------
+        step : int
+            1 towards the last time, -1 towards the first
+        """
+        boundary = element.n - (step < 0)
+        inside = _matching(self._of_elements, element.n, element.n + step)
+        return list(inside), list(_matching(self._of_boundaries, boundary, boundary + step))
+
     def compared(self, before: Element) -> list[tuple]:
         """Return the pairs whose zero sides show whether something switches at the boundary after ``before``, with partners."""
         n = before.n

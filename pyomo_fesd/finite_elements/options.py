@@ -1,5 +1,8 @@
 """The options of ``fesd.finite_elements``."""
 
+from collections.abc import Iterable
+from math import isfinite
+
 from pyomo.common.config import ConfigDict, ConfigValue, In, NonNegativeFloat, PositiveInt
 
 from pyomo_fesd.core import Renamed
@@ -10,17 +13,36 @@ from pyomo_fesd.finite_elements.equilibration import MODES
 RENAMED = Renamed('fesd.finite_elements', values={'cross_complementarity': {'stage': 'point'}})
 
 
+#: Largest number of collocation points: quadrature weights lose digits beyond (1e-10 at 12, 1e-6 at 18).
+MOST_POINTS = 12
+
+
 def _gamma(arg):
     """gamma, with 0 <= gamma < 1."""
-    gamma = float(arg)
-    if not 0 <= gamma < 1:
-        raise ValueError(f"length_bounds (gamma) must lie in [0, 1), not {arg}")
-    return gamma
+    return _checked(float, arg, lambda gamma: 0 <= gamma < 1, "it is not a number in [0, 1)")
+
+
+def _points(arg):
+    """A number of collocation points."""
+    return _checked(PositiveInt, arg, lambda number: number <= MOST_POINTS, f"it is not an integer from 1 to {MOST_POINTS}")
 
 
 def _numbers(arg):
     """A positive integer, or a list of them."""
-    return [PositiveInt(n) for n in arg] if isinstance(arg, (list, tuple)) else PositiveInt(arg)
+    several = isinstance(arg, (list, tuple))
+    found = [_checked(PositiveInt, n, bool, "it is not a positive integer, or a list of them") for n in (arg if several else [arg])]
+    return found if several else found[0]
+
+
+def _checked(convert, arg, holds, reason):
+    """``convert(arg)`` where this works and the condition ``holds``."""
+    try:
+        found = None if isinstance(arg, bool) else convert(arg)
+    except (TypeError, ValueError, OverflowError):
+        found = None
+    if found is None or not holds(found):
+        raise ValueError(reason)
+    return found
 
 
 def _list_of_components(arg):
@@ -29,7 +51,19 @@ def _list_of_components(arg):
 
 def _lengths(arg):
     """Vars in the order of the control stages, from a list or an indexed Var."""
-    return None if arg is None else list(arg.values() if hasattr(arg, 'values') else arg)
+    found = arg.values() if hasattr(arg, 'values') else arg
+    if isinstance(found, str) or not isinstance(found, Iterable):
+        raise ValueError("it is not a list of Vars")
+    if not (found := list(found)):
+        raise ValueError("it is empty")
+    return found
+
+
+def _labels(arg):
+    """Labels of control-stage boundaries."""
+    if not isinstance(arg, Iterable):
+        raise ValueError("it is not a list of numbers")
+    return [_checked(float, label, isfinite, "it is not a list of numbers") for label in arg]
 
 
 #: keyword -> default, domain, description
@@ -40,7 +74,7 @@ OPTIONS = {
         _numbers,
         "number of finite elements, all control stages together; or a list with one number for each control stage",
     ),
-    'ncp': (3, PositiveInt, "collocation points in each element (K)"),
+    'ncp': (3, _points, f"collocation points in each element (K), at most {MOST_POINTS}"),
     'scheme': (
         'LAGRANGE-RADAU',
         In(['LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE']),
@@ -79,7 +113,7 @@ OPTIONS = {
         "a Var: length of the horizon in time of the plant, in which the model is written",
     ),
     'stage_lengths': (None, _lengths, "the same for each control stage: one Var for each"),
-    'stages': (None, list, "labels of inner control-stage boundaries, only for a model that is discretised already"),
+    'stages': (None, _labels, "labels of inner control-stage boundaries, only for a model that is discretised already"),
 }
 
 

@@ -24,11 +24,13 @@ from pyomo_fesd.core import (
     label_decimals,
     moving_grids,
     read_grid,
+    read_keywords,
     restored_on_error,
     share_elements,
     signals,
     write_at_further_times,
 )
+from pyomo_fesd.finite_elements.arrivals import add_arrivals
 from pyomo_fesd.finite_elements.coincidences import add_coincidences
 from pyomo_fesd.finite_elements.contacts import add_friction_impulses, read_contacts, with_departures
 from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
@@ -112,8 +114,7 @@ class FiniteElements(Transformation):
 
     def _apply_to(self, instance, **kwds):
         RENAMED.refuse(kwds)
-        config = self.CONFIG(kwds.pop('options', {}))
-        config.set_value(kwds)
+        config = read_keywords(self.CONFIG, kwds, 'fesd.finite_elements')
         wrt = find_continuous_set(instance, config.wrt, 'fesd.finite_elements')
         instance = _common_block(instance, wrt)
         _check_keywords(instance, wrt, config)
@@ -150,9 +151,6 @@ def _check_keywords(instance, wrt, config):
     """Refuse models and options before anything is changed."""
     if wrt in moving_grids(instance):
         raise FesdError(wrt, "its elements are movable already", "apply fesd.finite_elements once for each ContinuousSet")
-    for name in ('nfe', 'ncp'):
-        if config.get(name).value() is None:
-            raise FesdError(wrt, f"fesd.finite_elements: {name}=None", f"give a positive number, or leave {name} out")
     check_controls(config.piecewise_constant, wrt)
     check_continuous(config.continuous, config.piecewise_constant, wrt)
     check_free_time(config.final_time, config.stage_lengths, wrt, signals(wrt))
@@ -278,3 +276,4 @@ def _add_switching(moving, switching, complementarities, continuity, config):
         add_sliding_exits(moving)
     add_neighbour_branches(moving)
     add_coincidences(moving)
+    add_arrivals(moving)

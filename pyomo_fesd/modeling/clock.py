@@ -10,29 +10,32 @@ Leaves: ``time``, ``rate`` and ``tick`` in a generated block.
 Does not apply: to inputs that are constant on each control stage; they need no clock.
 """
 
-from pyomo.core import Block, Constraint, Var
-from pyomo.dae import DerivativeVar
+from pyomo.core import Block, Constraint, Reference, Var
+from pyomo.core.base.var import IndexedVar
+from pyomo.dae import ContinuousSet, DerivativeVar
 
 from pyomo_fesd.core import GENERATED, FesdError, discretised, find_continuous_set
 
 
-def clock(block, wrt=None) -> Var:
-    """Return physical time as a Var over ``wrt``; the first call adds it, later calls return the same Var.
+def clock(block, wrt=None) -> IndexedVar:
+    """Return physical time as a Var over ``wrt``: the first call adds a state, and each call returns a reference to it.
 
-    Write ``pyomo_fesd.clock(m, m.t)[t]`` wherever a rule depends on time ``t``.
+    Write ``pyomo_fesd.clock(m, m.t)[t]`` wherever a rule depends on time ``t``, or give it a name: ``m.time = clock(m.t)``.
 
     Parameters
     ----------
-    block : Block
-        the model, or a part of it
+    block : Block or ContinuousSet
+        the model, or a part of it; or ``wrt`` itself
     wrt : ContinuousSet, optional
-        default: the only one; the clock is added to its block
+        default: the only one; the state is added to its block
 
     Raises
     ------
     FesdError
         if ``wrt`` has no clock yet and is discretised already
     """
+    if wrt is None and getattr(block, 'ctype', None) is ContinuousSet:
+        block, wrt = block.parent_block(), block
     wrt = find_continuous_set(block, wrt, 'clock')
     parent, name = wrt.parent_block(), f'{GENERATED}clock_{wrt.local_name}'
     if parent.component(name) is None:
@@ -40,7 +43,8 @@ def clock(block, wrt=None) -> Var:
             raise FesdError(wrt, "clock: it is discretised already, and a new state gets no equations", "make the clock before")
         parent.add_component(name, Block())
         _fill(parent.component(name), wrt)
-    return parent.component(name).time
+    # the state has its block already: the reference can get a name in the model
+    return Reference(parent.component(name).time, ctype=Var)
 
 
 def _fill(b, wrt):

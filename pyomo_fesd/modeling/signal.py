@@ -46,8 +46,8 @@ def signal(wrt: ContinuousSet, times, values=None, kind: str = 'linear', toleran
     """
     if getattr(wrt, 'ctype', None) is not ContinuousSet:
         raise FesdError(getattr(wrt, 'name', str(wrt)), "signal: this is not a ContinuousSet", "e.g. signal(m.t, times, values)")
-    if kind not in KINDS:
-        raise FesdError(wrt, f"signal: kind='{kind}'", f"give one of {', '.join(map(repr, KINDS))}")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise FesdError(wrt, f"signal: kind={kind!r}", f"give one of {', '.join(map(repr, KINDS))}")
     series, units = read_time_series(wrt, times, values, kind == 'stepped', tolerance, units)
     return KINDS[kind](wrt, series, units=units)
 

@@ -1,5 +1,9 @@
 """State jumps: a guard and the states after the jump, written in the model."""
 
+from collections.abc import Collection
+from math import isfinite
+from numbers import Real
+
 from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Expression
 
@@ -33,7 +37,22 @@ def state_jump(*sets, guard, reset) -> Block:
     Source: Nurkanovic, Frey, Pozharskiy, Diehl (2023), FESD-J.
     """
 
+    for name, given in (('guard', guard), ('reset', reset)):
+        if not callable(given):
+            raise FesdError('state_jump', f"{name}={given!r} is not a function", f"give {name}=lambda m, t: ...")
+    for given in sets:
+        if isinstance(given, str) or not isinstance(given, Collection):
+            raise FesdError('state_jump', f"{given!r} is not a Set", "give the ContinuousSet, and other Sets of the model")
+
     def rule(block, *index):
+        try:
+            fill(block, *index)
+        except FesdError:
+            # a Block with a part of its data is no component that a user could repair
+            block.parent_block().del_component(block.parent_component())
+            raise
+
+    def fill(block, *index):
         parent = block.parent_block()
         block.guard = Expression(expr=_guard(block, guard(parent, *index)))
         resets = _resets(block, reset(parent, *index))
@@ -56,10 +75,9 @@ def _guard(block, given):
 def _resets(block, given):
     pairs = list(given) if isinstance(given, (list, tuple)) else []
     if not pairs or not all(map(_is_pair, pairs)):
-        shown = str([str(part) for part in given] if isinstance(given, (list, tuple)) else given)
         raise FesdError(
             block,
-            f"its reset is {shown}, not a list of (state, value after)",
+            f"its reset is {_shown(given)}, not a list of (state, value after)",
             "e.g. [(m.v[t], -m.v[t])], written with values before",
         )
     known = ComponentSet()
@@ -68,6 +86,12 @@ def _resets(block, given):
             raise FesdError(block, f"'{state.name}' is reset twice", "give each state one value after the jump")
         known.add(state)
     return pairs
+
+
+def _shown(given):
+    if isinstance(given, (list, tuple)):
+        return f"[{', '.join(map(_shown, given))}]" if isinstance(given, list) else f"({', '.join(map(_shown, given))})"
+    return str(given) if hasattr(given, 'ctype') or hasattr(given, 'is_expression_type') else repr(given)
 
 
 def _is_pair(given):
@@ -81,4 +105,4 @@ def _is_variable(given):
 def _is_numeric(given):
     if hasattr(given, 'is_expression_type'):
         return given.is_numeric_type() and not given.is_indexed()
-    return isinstance(given, (int, float))
+    return isinstance(given, Real) and not isinstance(given, bool) and isfinite(given)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import inf
+from numbers import Real
 
 import numpy as np
 import pandas as pd
@@ -56,12 +58,14 @@ def read_time_series(wrt: ContinuousSet, times, values, stepped: bool, tolerance
     FesdError
         for arguments that are no such series
     """
+    if not isinstance(tolerance, Real) or not 0 <= tolerance < inf:
+        raise FesdError(wrt, f"signal: tolerance={tolerance!r}", "give a number that is not negative")
+    if units is not None and not hasattr(units, 'is_expression_type'):
+        raise FesdError(wrt, f"signal: units={units!r} is not a unit", "give one of pyomo.environ.units, e.g. units.kg")
     times, values = _both(wrt, times, values)
     values, units = _in_units(wrt, values, units)
     series = TimeSeries(_numbers(wrt, times, 'times'), _numbers(wrt, values, 'values'))
     _check(wrt, series, stepped)
-    if not tolerance >= 0:
-        raise FesdError(wrt, f"signal: tolerance={tolerance}", "give a number that is not negative")
     kept = (_steps if stepped else _corners)(series, max(tolerance, ROUND_OFF * np.abs(series.values).max()))
     return TimeSeries(series.times[kept], series.values[kept]), units
 

@@ -4,11 +4,12 @@ from collections.abc import Iterator
 from math import inf
 from numbers import Integral, Real
 
-from pyomo.core import Block, Objective
+from pyomo.contrib.solver.common.factory import SolverFactory
+from pyomo.core import Block, Objective, TransformationFactory
 from pyomo.core.base.var import VarData
 from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import FesdError, discretised
+from pyomo_fesd.core import FesdError, check_keywords, discretised
 from pyomo_fesd.simulation import states_fixed_later
 
 
@@ -28,9 +29,32 @@ def read_quantities(quantities) -> list[tuple]:
     return found
 
 
-def check(model: Block, wrt: ContinuousSet, tolerance: float, max_rounds: int) -> None:
+def read_options(given: dict) -> tuple[dict, dict]:
+    """Return the keywords of ``fesd.finite_elements`` among ``given``, and the options of ``mpec_hybrid``."""
+    grids, solver = TransformationFactory('fesd.finite_elements').CONFIG, SolverFactory('mpec_hybrid').CONFIG
+    keywords = {name: value for name, value in given.items() if name in grids}
+    options = {'time_limit' if name == 'timelimit' else name: value for name, value in given.items() if name not in grids}
+    check_keywords(grids, keywords, 'refine')
+    check_keywords(solver, options, 'refine')
+    return _converted(grids, keywords), _converted(solver, options)
+
+
+def _converted(declared, given):
+    read = declared(given)
+    return {name: read.get(name).value() for name in given}
+
+
+def read_nfe(nfe):
+    """Return the number of elements of the first round, or a list of numbers."""
+    grids = TransformationFactory('fesd.finite_elements').CONFIG
+    check_keywords(grids, {'nfe': nfe}, 'refine')
+    return grids({'nfe': nfe}).nfe
+
+
+def check(model: Block, wrt: ContinuousSet, tolerance: float, max_rounds: int, tee: bool) -> None:
     """Refuse numbers out of range, models that are discretised, and degrees of freedom without an objective."""
-    if not isinstance(tolerance, Real) or not 0 < tolerance < inf:
+    check_keywords(SolverFactory('mpec_hybrid').CONFIG, {'tee': tee}, 'refine')
+    if isinstance(tolerance, bool) or not isinstance(tolerance, Real) or not 0 < tolerance < inf:
         raise FesdError('tolerance', f"refine: it is {tolerance!r}", "give a positive number, e.g. 1e-6")
     if not isinstance(max_rounds, Integral) or max_rounds < 2:
         raise FesdError('max_rounds', f"refine: it is {max_rounds!r}", "an error is estimated by comparison: give 2 at least")

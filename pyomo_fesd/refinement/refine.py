@@ -15,13 +15,13 @@ from math import ceil, nan
 from operator import ge
 
 import numpy as np
-from pyomo.core import Block, TransformationFactory
+from pyomo.core import Block
 from pyomo.dae import ContinuousSet
 
 from pyomo_fesd.core import find_continuous_set, interruptible, share_elements
 from pyomo_fesd.diagnostics import diagnose, missed_crossings
 from pyomo_fesd.refinement.assessment import Round, assess, comparable
-from pyomo_fesd.refinement.checks import check, read_quantities
+from pyomo_fesd.refinement.checks import check, read_nfe, read_options, read_quantities
 from pyomo_fesd.refinement.dense_output import read_solution
 from pyomo_fesd.refinement.element_density import most_numbers
 from pyomo_fesd.refinement.kept_values import read_values, write_values
@@ -101,12 +101,11 @@ def refine(
         The model is as it was before.
     """
     wrt = find_continuous_set(model, wrt, 'refine')
-    check(model, wrt, tolerance, max_rounds)
+    check(model, wrt, tolerance, max_rounds, tee)
     quantities = read_quantities(quantities)
-    known = TransformationFactory('fesd.finite_elements').CONFIG
-    keywords = {name: options.pop(name) for name in list(options) if name in known} | {'ncp': ncp, 'scheme': scheme}
+    keywords, options = read_options(options | {'ncp': ncp, 'scheme': scheme})
     stages = len(wrt) - 1
-    numbers = share_elements(wrt, nfe if nfe is not None else stages * max(FIRST_EACH, ceil(FIRST / stages)))
+    numbers = share_elements(wrt, stages * max(FIRST_EACH, ceil(FIRST / stages)) if nfe is None else read_nfe(nfe))
     options = {'branch_tol': float(np.clip(EXACT * tolerance, *EXACT_LIMITS))} | options
     solver = RoundSolver(model, wrt, keywords, options)
     table = RoundTable({'objective': not solver.optimise, 'quantities': not quantities}, tee)

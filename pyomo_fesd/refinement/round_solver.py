@@ -1,15 +1,16 @@
 """Discretise and solve one round: by simulation without an objective, by ``mpec_hybrid`` with one."""
 
-from pyomo.core import Block, TransformationFactory
+from pyomo.core import Block, TransformationFactory, Var
 from pyomo.dae import ContinuousSet
+from pyomo.gdp import Disjunct
 from pyomo.opt import SolverFactory, TerminationCondition
 
-from pyomo_fesd.core import FesdError, moving_grids
+from pyomo_fesd.core import FesdError, kept_values, moving_grids, withheld_messages
 from pyomo_fesd.mpcc import Deadline
 from pyomo_fesd.refinement.checks import degree_of_freedom, objectives
 from pyomo_fesd.refinement.dense_output import RoundSolution
 from pyomo_fesd.refinement.interpolated_start import start_from
-from pyomo_fesd.simulation import simulate
+from pyomo_fesd.simulation import TooFewElements, simulate
 
 #: Ipopt iterations of a round that a finer one follows: on a grid that is too coarse, searches for a feasible point do not end.
 IMPATIENT = 5000
@@ -34,7 +35,7 @@ class RoundSolver:
 
     def __init__(self, model: Block, wrt: ContinuousSet, keywords: dict, options: dict):
         self._model, self._wrt, self._keywords, self._options = model, wrt, keywords, dict(options)
-        self.deadline = Deadline.after(self._options.pop('time_limit', self._options.pop('timelimit', None)))
+        self.deadline = Deadline.after(self._options.pop('time_limit', None))
         self.ncp = keywords['ncp']
         self.order = 2 * self.ncp - (keywords['scheme'] == 'LAGRANGE-RADAU')
         self.optimise = any(True for _ in objectives(model))
@@ -62,7 +63,26 @@ class RoundSolver:
             return error
         return None
 
+    def _hopeless(self):
+        """The error of a simulation with the present values for which the elements are too few; None if it has another end.
+
+        An optimisation with more switches than elements burns its iterations, while a finer round costs little more.
+        """
+        variables = list(self._model.component_data_objects(Var, descend_into=(Block, Disjunct)))
+        try:
+            with kept_values(variables), withheld_messages('pyomo_fesd'):
+                simulate(self._model, self._wrt, time_limit=self.deadline.left())
+        except TooFewElements as error:
+            return error
+        except FesdError:
+            # nothing is known of a model that cannot be simulated
+            return None
+        return None
+
     def _optimise(self, numbers, before):
+        hopeless = None if self.patient or before is not None else self._hopeless()
+        if hopeless is not None:
+            return hopeless
         if before is not None:
             start_from(self._model, self._wrt, before)
         options = {'warm_start': before is not None, 'timelimit': self.deadline.left()}

@@ -1,6 +1,7 @@
 """Plots of trajectories with element boundaries and switches."""
 
 import io
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -47,6 +48,7 @@ def plot(
         for a name that is not a column
     """
     wrt = find_continuous_set(model, wrt, 'plot')
+    names, units = _checked_names(names), _checked_units(units)
     frame, columns = trajectory(model, wrt), list(columns_over_time(model, wrt))
     names = names or _states_and_multipliers(model, wrt, columns)
     groups = [(name, _named(columns, name)) for name in names]
@@ -56,7 +58,7 @@ def plot(
     for axis, (name, group) in zip(axes, groups):
         for column in group:
             _draw(axis, frame, column, model, wrt)
-        axis.set_ylabel((units or {}).get(name, name))
+        axis.set_ylabel(units.get(name, name))
         if len(group) > 1:
             axis.legend(fontsize='small')
         for switch in switches(model, wrt):
@@ -66,6 +68,20 @@ def plot(
         axis.margins(x=0.01)
     axes[-1].set_xlabel(wrt.local_name)
     return figure
+
+
+def _checked_names(names):
+    if isinstance(names, str):
+        return [names]
+    if names is not None and not (isinstance(names, Iterable) and all(isinstance(name, str) for name in names)):
+        raise FesdError('plot', f"names={names!r} is not a list of names", "give columns of the trajectory, e.g. ['x', 'sgn']")
+    return list(names or ())
+
+
+def _checked_units(units):
+    if units is not None and not isinstance(units, Mapping):
+        raise FesdError('plot', f"units={units!r} is not a dictionary", "give a label for each name, e.g. {'x': 'x in m'}")
+    return units or {}
 
 
 def _states_and_multipliers(model, wrt, columns):

@@ -11,4 +11,5 @@ One element: ``equation_reader`` reads its ``element_equations``, ``structural_k
 """
 
 from pyomo_fesd.simulation import first_guess
+from pyomo_fesd.simulation.progress import TooFewElements
 from pyomo_fesd.simulation.simulate import simulate, states_fixed_later

@@ -16,7 +16,7 @@ from pyomo_fesd.simulation.element_equations import ElementEquations
 from pyomo_fesd.simulation.element_model import ElementModel, write_values
 
 #: Options of the small problems: the simulation judges uncertified points itself; a relaxation that takes long does not succeed.
-OPTIONS = {'raise_exception_on_nonoptimal_result': False, 'relaxation_iterations': 100, 'natural_units': 'user'}
+OPTIONS = {'raise_exception_on_nonoptimal_result': False, 'relaxation_iterations': 100, 'natural_units': 'starts'}
 
 
 class ElementMpcc:

@@ -10,9 +10,26 @@ from collections.abc import Iterable, Iterator
 from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Constraint, Var
 from pyomo.core.base.var import VarData
+from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import TimeIndex, derivatives
+from pyomo_fesd.core import FesdError, TimeIndex, derivatives, is_indexed_by
 from pyomo_fesd.simulation.structural_key import variables_of
+
+
+def read_inputs(inputs: Var | Iterable[Var], wrt: ContinuousSet) -> list[Var]:
+    """Return the ``inputs`` as a list of Vars over ``wrt``.
+
+    Raises
+    ------
+    FesdError
+        for anything else
+    """
+    listed = list(inputs) if isinstance(inputs, (list, tuple)) else [inputs]
+    for u in listed:
+        if getattr(u, 'ctype', None) is not Var or not is_indexed_by(u, wrt):
+            shown = getattr(u, 'name', repr(u))
+            raise FesdError(shown, f"simulate: inputs: this is not a Var over '{wrt.name}'", "give e.g. m.u, or [m.u, m.v]")
+    return listed
 
 
 def given_variables(model: Block, times: TimeIndex, inputs: Iterable[Var], held: Constraint) -> ComponentSet:

@@ -14,6 +14,7 @@ from pyomo.core.expr.numeric_expr import SumExpression
 
 from pyomo_fesd.core import Pair, TimeIndex, is_generated, kept_values, read_complementarity
 from pyomo_fesd.simulation.element_equations import ElementEquations
+from pyomo_fesd.solvers import user_names
 
 #: Equations that a message names.
 SHOWN = 3
@@ -32,9 +33,10 @@ def largest_residuals(model: Block, times: TimeIndex, equations: ElementEquation
     if not violated:
         return ''
     shown = sorted(violated, key=lambda f: -f[0])[:SHOWN]
-    block = shown[0][-1].parent_block()
-    where = '' if block.parent_block() is None else f" in {block.name}"
-    return f"largest residuals{where}: " + ', '.join(f"{c.name} ({residual:.2g})" for _, residual, c in shown)
+    block, names = shown[0][-1].parent_block(), user_names(model)
+    where = '' if block.parent_block() is None or is_generated(block) else f" in {block.name}"
+    named = ((names(c) if is_generated(c) else c.name, residual) for _, residual, c in shown)
+    return f"largest residuals{where}: " + ', '.join(f"{name} ({residual:.2g})" for name, residual in named)
 
 
 def _equations_of_user(model, times, labels):

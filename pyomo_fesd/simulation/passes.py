@@ -7,8 +7,9 @@ jump.  Where these need more elements than a control stage has, the next pass ke
 import logging
 
 from pyomo_fesd.core import FesdError, moving_grids, phase
+from pyomo_fesd.finite_elements import refuse_first_mode
 from pyomo_fesd.simulation.element_solver import CUT, ElementSolver
-from pyomo_fesd.simulation.progress import Progress, accumulation
+from pyomo_fesd.simulation.progress import Progress, TooFewElements, accumulation
 from pyomo_fesd.simulation.step_sizes import EvenSteps, equal_steps, equilibration_is_active
 
 logger = logging.getLogger('pyomo_fesd')
@@ -37,6 +38,7 @@ class Simulation:
         """Simulate all elements, and again with equal lengths between the switches found."""
         with phase(self._timer, 'begin'):
             self._solver.find_initial_values()
+        refuse_first_mode(self._moving)
         plan = self._fit_elements()
         if equilibration_is_active(self._moving) and not self._equalise():
             self._pass(plan)
@@ -60,6 +62,7 @@ class Simulation:
         return self._progress.error(
             f"the elements of control stage {stage} are used up at time {self._progress.time:.6g}, after {number} switches",
             "take more elements (nfe)",
+            TooFewElements,
         )
 
     def _expected_switches(self, stage):

@@ -30,6 +30,10 @@ def accumulation(events: Sequence[tuple[float, str]]) -> tuple[list[float], floa
     return None
 
 
+class TooFewElements(FesdError):
+    """There are more switches than elements, and the switches do not accumulate: more elements help."""
+
+
 class Progress:
     """Time reached in a pass, and events so far.
 
@@ -55,11 +59,11 @@ class Progress:
             cause = f"simulate: the time limit is reached at time {self.time:.6g}"
             raise FesdError(self._wrt, cause, "give more time (time_limit); the model has the values up to there")
 
-    def error(self, cause: str, fix: str) -> FesdError:
-        """Return the error of a simulation that cannot go on; accumulating switches replace other causes."""
+    def error(self, cause: str, fix: str, kind: type = FesdError) -> FesdError:
+        """Return the error of a simulation that cannot go on, of this ``kind``; accumulating switches replace other causes."""
         limit = accumulation([event for events in self.events.values() for event in events])
         if limit is not None:
             times = ', '.join(f'{t:.9g}' for t in limit[0])
             cause = f"the switches accumulate (Zeno): the last ones are at times {times}, their limit is about {limit[1]:.6g}"
-            fix = "no number of elements reaches beyond: end before, or model what happens there (a rest, a slide)"
-        return FesdError(self._wrt, f"simulate: {cause}", fix)
+            kind, fix = FesdError, "no number of elements reaches beyond: end before, or model what happens there (a rest, a slide)"
+        return kind(self._wrt, f"simulate: {cause}", fix)

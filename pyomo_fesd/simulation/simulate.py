@@ -18,10 +18,21 @@ from pyomo.core import Block, Var
 from pyomo.core.base.var import VarData
 from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import FesdError, TimeIndex, derivatives, find_continuous_set, interruptible, kept_values, moving_grids, phase
+from pyomo_fesd.core import (
+    FesdError,
+    TimeIndex,
+    check_keywords,
+    derivatives,
+    find_continuous_set,
+    interruptible,
+    kept_values,
+    moving_grids,
+    phase,
+)
 from pyomo_fesd.diagnostics import diagnose
 from pyomo_fesd.mpcc import Deadline
 from pyomo_fesd.results import set_indicators, trajectory
+from pyomo_fesd.simulation.inputs import read_inputs
 from pyomo_fesd.simulation.passes import Simulation
 from pyomo_fesd.simulation.scalar_results import evaluate_scalars
 from pyomo_fesd.simulation.static_equations import solve_static_equations
@@ -64,9 +75,11 @@ def simulate(
     wrt = find_continuous_set(model, wrt, 'simulate')
     if wrt not in moving_grids(model):
         raise FesdError(wrt, "simulate: its elements are not movable", "apply fesd.finite_elements first")
-    deadline = Deadline.after(options.pop('time_limit', None))
-    inputs = list(inputs) if isinstance(inputs, (list, tuple)) else [inputs]
-    SolverFactory('mpec_hybrid', **options)  # refuses unknown options before anything is solved
+    known = SolverFactory('mpec_hybrid').CONFIG
+    check_keywords(known, options | {'timer': timer}, 'simulate')
+    inputs = read_inputs(inputs, wrt)
+    deadline = Deadline.after(known(options).time_limit)
+    options.pop('time_limit', None)
     solve_static_equations(model, wrt)
     timer = timer or HierarchicalTimer()
     with kept_values(states_fixed_later(model, wrt)), phase(timer, 'simulate'), PauseGC():

@@ -2,7 +2,7 @@
 
 import logging
 
-from pyomo.common.config import ConfigDict, ConfigValue, NonNegativeFloat, document_class_CONFIG
+from pyomo.common.config import Bool, ConfigDict, ConfigValue, NonNegativeFloat, document_class_CONFIG
 from pyomo.common.gc_manager import PauseGC
 from pyomo.core import Transformation, TransformationFactory
 from pyomo.core.base.block import BlockData
@@ -18,6 +18,7 @@ from pyomo_fesd.core import (
     find_continuous_set,
     known_sign,
     moving_grids,
+    read_keywords,
     restored_on_error,
 )
 from pyomo_fesd.smoothing.generated_blocks import add_to_source, last_number, source_of
@@ -91,15 +92,14 @@ class SmoothToComplementarity(Transformation):
         'protective',
         ConfigValue(
             default=False,
-            domain=bool,
+            domain=Bool,
             description="replace also inside roots, logarithms, denominators and powers other than 1, 2, 3, ..., where "
             "smoothing may keep the argument away from 0",
         ),
     )
 
     def _apply_to(self, instance, **kwds):
-        config = self.CONFIG(kwds.pop('options', {}))
-        config.set_value(kwds)
+        config = read_keywords(self.CONFIG, kwds, NAME)
         over = [find_continuous_set(instance, config.wrt, NAME)] if config.wrt is not None else _continuous_sets(instance)
         choice = {'exclude': config.exclude, 'largest_eps': config.largest_eps, 'protective': config.protective}
         with TRANSFORMATION, restored_on_error(instance):

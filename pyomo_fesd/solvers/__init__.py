@@ -2,7 +2,7 @@
 
 Read in this order: ``mpec_hybrid`` (puts the parts of ``pyomo_fesd.mpcc`` together) with ``options`` (one row each),
 ``persistent_model`` (``set_instance``: compiled once, solved many times) and ``unready_models`` (models that are refused),
-``simulated_start`` (a simulation where nothing is free),
+``simulated_start`` (a simulation where nothing is free), ``user_names`` (of what is violated),
 ``casadi_ipopt`` (plain NLPs), ``plugin`` (code of both).  Here, and not in ``mpcc``, solvers know of time: indicators of disjuncts,
 diagnostics, models that are not discretised.
 """
@@ -11,3 +11,4 @@ from pyomo_fesd.solvers import casadi_ipopt
 from pyomo_fesd.solvers.mpec_hybrid import certify
 from pyomo_fesd.solvers.simulated_start import register_simulation
 from pyomo_fesd.solvers.unready_models import refuse_unready
+from pyomo_fesd.solvers.user_names import user_names

@@ -26,6 +26,7 @@ from pyomo_fesd.mpcc import Contradiction, Loader, OutOfTime, PlainIpopt, compil
 from pyomo_fesd.results import set_indicators
 from pyomo_fesd.solvers.plugin import CasadiSolver, LegacyPlugin, deadline, with_structure
 from pyomo_fesd.solvers.unready_models import refuse_unready
+from pyomo_fesd.solvers.user_names import user_names
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -104,7 +105,7 @@ class CasadiIpopt(CasadiSolver):
 
     def _solve(self, model, kwds):
         started = time.perf_counter()
-        config = self.config(value=kwds, preserve_implicit=True)
+        config = self._options(kwds)
         results = self._begin(config)
         options = _ipopts_own(config.solver_options.value())
         scaled = config.writer_config.scale_model or options.get('nlp_scaling_method') == 'user-scaling'
@@ -137,9 +138,8 @@ def _read_nlp(model):
     refuse_unready(model, NAME)
     problem = read_mpcc(model)
     if problem.sources:
-        raise FesdError(
-            problem.sources[0], f"an active Complementarity, which {NAME} does not handle", "use mpec_hybrid, or deactivate it"
-        )
+        name = user_names(model)(problem.sources[0])
+        raise FesdError(name, f"an active Complementarity, which {NAME} does not handle", "use mpec_hybrid, or deactivate it")
     return problem
 
 

@@ -10,8 +10,9 @@ from pyomo.common.timing import HierarchicalTimer
 from pyomo.contrib.solver.common.factory import SolverFactory
 from pyomo.contrib.solver.common.results import Results, SolutionStatus
 from pyomo.core import Block
+from pyomo.core.staleflag import StaleFlagManager
 
-from pyomo_fesd.core import FesdError, __version__, interruptible, phase
+from pyomo_fesd.core import FesdError, __version__, check_keywords, interruptible, phase
 from pyomo_fesd.diagnostics import diagnose
 from pyomo_fesd.mpcc import (
     Certificate,
@@ -36,11 +37,10 @@ from pyomo_fesd.solvers.persistent_model import PersistentModel, persistent_mode
 from pyomo_fesd.solvers.plugin import CasadiSolver, LegacyPlugin, deadline, review, with_structure
 from pyomo_fesd.solvers.simulated_start import SimulatedStart
 from pyomo_fesd.solvers.small_states import warn_small_states
+from pyomo_fesd.solvers.user_names import user_names
 
 NAME = 'mpec_hybrid'
 COMPILING = "it was up while the model was compiled"
-#: Options that Pyomo's wrapper for the older interface takes itself.
-WRAPPED = ('tee', 'load_solutions', 'symbolic_solver_labels', 'raise_exception_on_nonoptimal_result', 'solver_options')
 
 
 @document_class_CONFIG(methods=['solve'])
@@ -114,28 +114,26 @@ class MpecHybrid(CasadiSolver):
         with RunRecord(config.json_file, results, config) as record, log_streams(config.tee, config.log_file) as streams:
             table = (StartsTable if config.starts > 1 else LogTable)(streams)
             until = deadline(config, started)
-            start = self._simulated_start(model, config, until, table)
-            try:
-                ready = self._ready(model, config, until)
-            except Contradiction as error:
-                fill_results(results, model, Run(Outcome.INFEASIBLE), set_indicators, reason=str(error))
-            except OutOfTime:
-                fill_results(results, model, Run(Outcome.TIME_LIMIT), set_indicators, reason=COMPILING)
-            else:
-                compiled = record.compiled = ready.compiled
-                table.begin(compiled)
-                after = reporter(config.callback, compiled, started)
-                setup = Setup(compiled, config, config.timer, ready.deadline, ready.cache, table.row, after)
-                solver = (Multistart if config.starts > 1 else HybridSolver)(setup)
-                record.run = solver.run
-                fill_results(results, model, solver.solve(), set_indicators, compiled)
-                if results.solution_status is SolutionStatus.infeasible:
-                    results.extra_info.reason = with_structure(results.extra_info.reason, model)
-            if start.note and not start.found and results.solution_status is not SolutionStatus.optimal:
-                results.extra_info.reason = '; '.join(filter(None, (results.extra_info.reason, start.note)))
-            loaded = self._load(results)
-            if not loaded:
-                start.restore()
+            with self._simulated_start(model, config, until, table) as start:
+                try:
+                    ready = self._ready(model, config, until)
+                except Contradiction as error:
+                    fill_results(results, model, Run(Outcome.INFEASIBLE), set_indicators, reason=str(error))
+                except OutOfTime:
+                    fill_results(results, model, Run(Outcome.TIME_LIMIT), set_indicators, reason=COMPILING)
+                else:
+                    compiled = record.compiled = ready.compiled
+                    table.begin(compiled)
+                    shared = compiled, config, config.timer, ready.deadline, ready.cache
+                    setup = Setup(*shared, table.row, reporter(config.callback, compiled, started), start.further(compiled))
+                    solver = (Multistart if config.starts > 1 else HybridSolver)(setup)
+                    record.run = solver.run
+                    fill_results(results, model, solver.solve(), set_indicators, compiled, names=user_names)
+                _explain(results, model, record, start)
+                loaded = self._load(results)
+                if not loaded:
+                    start.restore()
+                    StaleFlagManager.mark_all_as_stale()
             results.timing_info.wall_time = time.perf_counter() - started
             table.end(results)
         self._refuse_nonoptimal(results, f"{results.extra_info.outcome}. {results.extra_info.reason}")
@@ -174,7 +172,7 @@ class MpecHybrid(CasadiSolver):
 
     def _configure(self, kwds):
         """Options of this call; those in ``solver_options`` (``options`` in the legacy interface) are ours as well."""
-        config = self.config(value=kwds, preserve_implicit=True)
+        config = self._options(kwds)
         extra = config.solver_options.value()
         unknown = [name for name in extra if name not in config]
         if unknown:
@@ -183,6 +181,7 @@ class MpecHybrid(CasadiSolver):
                 f"unknown option(s) {', '.join(unknown)}",
                 "see the options page; Ipopt's own go in nlp_options={...}, HiGHS' in lpec_options={...}",
             )
+        check_keywords(config, extra, self.name)
         config.set_value(extra)
         if config.threads is not None:
             config.lpec_options.set_value({'threads': config.threads} | config.lpec_options.value())
@@ -196,19 +195,28 @@ class LegacyMpecHybrid(LegacyPlugin, MpecHybrid):
         if kwds.get('logfile') is not None:
             # Pyomo's wrapper refuses its former name of our option
             kwds['log_file'] = kwds.pop('logfile')
-        self.config.set_value({name: kwds.pop(name) for name in list(kwds) if name in self.config and name not in WRAPPED})
-        return kwds
+        return super()._own_keywords(kwds)
 
     def _map_results(self, model, results):
         legacy, solution = super()._map_results(model, results)
-        if results.solution_status is SolutionStatus.optimal:
-            legacy.solver.message = results.extra_info.outcome
+        info, optimal = results.extra_info, results.solution_status is SolutionStatus.optimal
+        legacy.solver.message = info.outcome if optimal or not info.reason else f"{info.outcome}; {info.reason}"
         return legacy, solution
 
 
 SolverFactory.register(NAME, doc="Certified MPCC solutions: Reg(eps) in Ipopt and a reduced LPEC in HiGHS")(
     MpecHybrid, LegacyMpecHybrid
 )
+
+
+def _explain(results, model, record, start):
+    """Add to the reason of a failure what the structure of the model and the simulated start show."""
+    info = results.extra_info
+    if results.solution_status is SolutionStatus.infeasible and record.run is not None:
+        info.reason = with_structure(info.reason, model)
+    if results.solution_status is not SolutionStatus.optimal:
+        refused = '' if record.run is None else record.run.refused
+        info.reason = '; '.join(filter(None, (info.reason, start.reason(refused))))
 
 
 @interruptible
@@ -229,6 +237,7 @@ def certify(model: Block, **options) -> Certificate:
     Certificate
         with ``certified``, ``grade`` (a sentence), the residuals, ``value`` of the LPEC and its ``direction`` by variable
     """
+    check_keywords(MpecHybrid.CONFIG, options, 'certify')
     config = MpecHybrid.CONFIG(value=options)
     timer = HierarchicalTimer()
     ready = PersistentModel(model, config, timer)

@@ -1,6 +1,7 @@
 """The options of ``mpec_hybrid``, one row each: name, default, domain, meaning."""
 
 from pyomo.common.config import (
+    Bool,
     ConfigDict,
     ConfigValue,
     In,
@@ -13,6 +14,13 @@ from pyomo.common.config import (
 from pyomo.contrib.solver.common.config import SolverConfig
 
 from pyomo_fesd.mpcc import NATURAL_UNITS, RELAXATIONS
+
+
+def solver_name(given):
+    """Domain of options that are names."""
+    if not isinstance(given, str):
+        raise ValueError(f"not a name: {given!r}")
+    return given
 
 
 def function(given):
@@ -56,7 +64,7 @@ OPTIONS = (
     (
         'warm_start',
         False,
-        bool,
+        Bool,
         "begin at the branch that the values in the model name; if its solution is certified, the run ends there, at the local "
         "solution next to the start, without a homotopy; of several starts this applies to the first one",
     ),
@@ -65,13 +73,13 @@ OPTIONS = (
         'auto',
         In(['auto', True, False]),
         "simulate first (pyomo_fesd.simulate) and start from these values: 'auto' where there is no objective and no state is "
-        "fixed later; with True controls keep their values, and the run goes on as with warm_start; a simulation that "
-        "fails is noted in the log, and the run begins with the model's values",
+        "fixed later, elsewhere if the homotopy finds no feasible point; with True controls keep their values, and the run goes "
+        "on as with warm_start; a simulation that fails is noted in the log, and the run begins with the model's values",
     ),
     (
         'nlp_solver',
         'ipopt',
-        str,
+        solver_name,
         "NLP solver: 'ipopt' (the one in casadi's wheel), 'uno' (also there), 'cyipopt' (the system's Ipopt), or an "
         "executable that reads NL files and that Pyomo knows, e.g. 'pounce', 'asl:ipopt'",
     ),
@@ -111,7 +119,7 @@ OPTIONS = (
         "where the starts run: None for one by one in this process, or an executor of concurrent.futures or with its "
         "methods, e.g. ProcessPoolExecutor() or Dask's client.get_executor()",
     ),
-    ('user_scaling', True, bool, "apply Pyomo's scaling_factor suffixes"),
+    ('user_scaling', True, Bool, "apply Pyomo's scaling_factor suffixes"),
     (
         'natural_units',
         'auto',

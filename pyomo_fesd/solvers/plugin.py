@@ -11,30 +11,51 @@ from pyomo.contrib.solver.common.util import NoOptimalSolutionError
 from pyomo.core.staleflag import StaleFlagManager
 
 from pyomo_fesd.analysis import structure
-from pyomo_fesd.core import interruptible
+from pyomo_fesd.core import check_keywords, interruptible
 from pyomo_fesd.mpcc import Deadline
 
 logger = logging.getLogger('pyomo_fesd')
 
+#: Keywords of Pyomo's wrapper for the older interface: those that are options of ours, under another name, and no options.
+WRAPPED = (
+    'tee',
+    'load_solutions',
+    'symbolic_solver_labels',
+    'raise_exception_on_nonoptimal_result',
+    'solver_options',
+    'writer_config',
+)
+RENAMED = {'timelimit': 'time_limit', 'options': 'solver_options'}
+NO_OPTIONS = ('logfile', 'solnfile', 'report_timing', 'solver_io', 'suffixes', 'keepfiles')
+
 
 class CasadiSolver(SolverBase):
     """A solver that needs the Ipopt in casadi's wheel."""
+
+    def __init__(self, **kwds):
+        check_keywords(self.CONFIG, {name: kwds[name] for name in kwds if name != 'name'}, kwds.get('name', self.name))
+        super().__init__(**kwds)
+
+    def _options(self, kwds):
+        """The options of one call."""
+        check_keywords(self.config, kwds, self.name)
+        return self.config(value=kwds, preserve_implicit=True)
 
     def available(self) -> Availability:
         """Whether casadi's wheel contains Ipopt."""
         return Availability.FullLicense if ca.has_nlpsol('ipopt') else Availability.NotFound
 
     def _begin(self, config):
-        """Empty results of a solve with ``config``, which gets a timer; all values of the model become stale."""
+        """Empty results of a solve with ``config``, which gets a timer."""
         results = Results()
         results.solver_name, results.solver_version, results.solver_config = self.name, self.version(), config
         results.timing_info.start_timestamp = datetime.datetime.now(datetime.timezone.utc)
         config.timer = results.timing_info.timer = config.timer or HierarchicalTimer()
-        StaleFlagManager.mark_all_as_stale()
         return results
 
     def _load(self, results):
-        """Load the solution if the options say so; returns whether it was loaded."""
+        """Load the solution if the options say so; returns whether it was loaded.  Other values of the model become stale."""
+        StaleFlagManager.mark_all_as_stale()
         found = results.solution_loader.get_number_of_solutions()
         loads = bool(results.solver_config.load_solutions and found and not _raises(results))
         if loads:
@@ -88,7 +109,13 @@ class LegacyPlugin(LegacySolverWrapper):
             self.config.set_value(kept)
 
     def _own_keywords(self, kwds):
-        """Keywords for Pyomo's wrapper, which knows only its own."""
+        """Keywords for Pyomo's wrapper, which knows only its own: our options are set, unknown ones refused."""
+        own = {name: kwds.pop(name) for name in list(kwds) if name in self.config and name not in (*WRAPPED, *NO_OPTIONS)}
+        given = {RENAMED.get(name, name): value for name, value in kwds.items() if name not in NO_OPTIONS}
+        # for Pyomo's wrapper None means that a keyword is not given
+        meant = {name: value for name, value in given.items() if value is not None or name not in self.config}
+        check_keywords(self.config, own | meant, self.name)
+        self.config.set_value(own)
         return kwds
 
     def _map_results(self, model, results):

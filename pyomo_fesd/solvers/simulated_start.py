@@ -1,18 +1,20 @@
-"""Start from a simulation where nothing is free (option ``simulate_first``).
+"""Start from a simulation (option ``simulate_first``): first where nothing is free, else where the homotopy finds no point.
 
 The room ``simulation`` lies above this one and uses its solvers; it registers what is called here.
 
 Takes: a model, the options, and the deadline of the run.
-Leaves: the simulated values in the model; after a failure, and on ``restore``, the values of before.
+Leaves: the simulated values in the model, or as an array; after a failure, on ``restore``, and where the run ends with a
+FesdError, the values of before.
 """
 
 import time
 from collections.abc import Callable
 
+import numpy as np
 from pyomo.core import Block, Var
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import FesdError, withheld_messages
+from pyomo_fesd.core import FesdError, moving_grids, withheld_messages
 from pyomo_fesd.mpcc import Deadline
 
 #: Part of the time limit that a simulation may take.
@@ -46,25 +48,62 @@ class SimulatedStart:
 
     def __init__(self, model: Block, options, deadline: Deadline):
         self.found, self.note, self._before = False, '', []
+        self._model, self._options, self._deadline = model, options, deadline
         if options.simulate_first is False or options.warm_start or options.mode != 'hybrid' or model.model() is not model:
+            self._further = False
             return
-        variables = model.component_data_objects(Var, descend_into=(Block, Disjunct))
-        self._before = [(v, v.value, v.stale) for v in variables]
+        self._remember()
         try:
-            self._simulate(model, options, deadline)
+            self.found = self._simulate("simulated first", options.simulate_first is True)
         finally:
             if not self.found:
                 self.restore()
+        self._further = not self.note and len(moving_grids(model)) == 1
 
-    def _simulate(self, model, options, deadline):
-        began, seconds = time.perf_counter(), None if deadline.at is None else SHARE * deadline.left()
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, *_):
+        if kind is not None and issubclass(kind, FesdError):
+            self.restore()
+
+    def further(self, compiled) -> Callable | None:
+        """Return a function that simulates once more, with all that is free at its present value; None where that is no help.
+
+        It returns the values in the units of ``compiled`` (MpccFunctions), or None, and a note for the log; the model is left as it
+        was.
+        """
+        return (lambda: self._values_of_simulation(compiled)) if self._further else None
+
+    def _values_of_simulation(self, compiled) -> tuple[np.ndarray | None, str]:
+        self._remember()
+        try:
+            found = self._simulate("no feasible point, so simulated", True)
+            return compiled.present_values() if found else None, self.note
+        finally:
+            self.restore()
+
+    def _simulate(self, what, demanded):
+        """Write a simulation into the model, with a note; returns whether there is one."""
+        began, left = time.perf_counter(), self._deadline.left()
         try:
             with withheld_messages('pyomo_fesd'):
-                self.found = any(one(model, options.simulate_first is True, options.timer, seconds) for one in _registered)
-            if self.found:
-                self.note = f"simulated first in {time.perf_counter() - began:.2f} s (simulate_first): the values are the start"
+                timer, seconds = self._options.timer, None if left is None else SHARE * left
+                found = any(one(self._model, demanded, timer, seconds) for one in _registered)
+            if found:
+                self.note = f"{what} in {time.perf_counter() - began:.2f} s (simulate_first): the values are the start"
         except FesdError as error:
-            self.note = f"simulated first (simulate_first), without success: {error.component}: {error.cause}"
+            found = False
+            self.note = f"{what} (simulate_first), without success: {error.component}: {error.cause}"
+        return found
+
+    def _remember(self):
+        variables = self._model.component_data_objects(Var, descend_into=(Block, Disjunct))
+        self._before = [(v, v.value, v.stale) for v in variables]
+
+    def reason(self, refused: str) -> str:
+        """Return what a run that failed saw of this start; ``refused`` says why it is no solution."""
+        return self.note + f", and were not accepted: {refused}" * bool(self.found and refused)
 
     def restore(self) -> None:
         """Give the model the values of before."""

@@ -5,6 +5,7 @@ from pyomo.dae import DerivativeVar, Integral
 from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd.core import FesdError, all_switched_systems, continuous_sets, moving_grids, refuse_no_model
+from pyomo_fesd.finite_elements import refuse_first_modes
 
 #: Components that must not be active -> fix.
 REFUSED = {
@@ -23,8 +24,8 @@ def refuse_unready(model: Block, solver: str) -> None:
     Raises
     ------
     FesdError
-        for active Disjunctions, logic, SOS, derivatives and integrals, for integer variables, and for modes with hysteresis or
-        state jumps on elements that do not move
+        for active Disjunctions, logic, SOS, derivatives and integrals, for integer variables, for modes with hysteresis or
+        state jumps on elements that do not move, and for a first mode outside of its region
     """
     refuse_no_model(model, solver)
     for ctype, fix in REFUSED.items():
@@ -38,6 +39,7 @@ def refuse_unready(model: Block, solver: str) -> None:
     for component, kind in _need_moving_elements(model):
         if not any(wrt in grids for wrt in continuous_sets(component)):
             raise FesdError(component, f"{kind} on a grid whose elements do not move", "apply fesd.finite_elements first")
+    refuse_first_modes(model)
 
 
 def _need_moving_elements(model):

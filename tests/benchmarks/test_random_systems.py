@@ -1,4 +1,4 @@
-"""Some random switching systems of the study: simulate is right on each, against event-located scipy."""
+"""Some random switching systems of the study: answers are right, against event-located scipy."""
 
 import pytest
 from benchmarks.random_systems.generate import KINDS, draw
@@ -11,3 +11,12 @@ def test_simulate_is_right(kind, seed):
     system, found = draw(kind, seed)
     verdict, error, said = run(system, found, 'simulate', limit=60)
     assert verdict in (RIGHT, ALARM), (error, said)
+
+
+@pytest.mark.parametrize('method', ['simulate', 'mpec_hybrid'])
+@pytest.mark.parametrize('kind, seed', [('start on the surface', 2), ('repelling', 0), ('units', 14)])
+def test_constants_that_cancel_hide_no_solution(kind, seed, method):
+    """A start on a surface up to round-off, and states of 1e-7 near one."""
+    system, found = draw(kind, seed)
+    verdict, error, said = run(system, found, method, limit=60)
+    assert verdict == RIGHT, (error, said)

@@ -694,3 +694,11 @@ def test_a_fault_at_a_later_time_can_be_put_right_and_the_discretisation_repeate
     m.level.value = 0.0
     finite_elements(m, nfe=2, ncp=2)
     assert len(generated(m, Complementarity)) == 2 * len(m.t)
+
+
+@pytest.mark.parametrize('start', [1e-302, 5e-324, -1e-160, 1e-90, 0.0, 1e150])
+@pytest.mark.parametrize('form', ['heaviside', 'stewart', 'auto'])
+def test_opposite_conditions_are_recognised_at_any_start_value(form, start):
+    m = signum(x0=start)
+    dcs(m, form=form)
+    assert not m.sgn[0].active

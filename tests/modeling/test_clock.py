@@ -41,11 +41,27 @@ def test_a_rule_reads_the_time_of_the_plant(scheme, ncp, first, caplog):
 
 def test_there_is_one_clock_for_each_time():
     m = ramp()
-    assert pyomo_fesd.clock(m) is pyomo_fesd.clock(m, m.t)
+    assert pyomo_fesd.clock(m)[0] is pyomo_fesd.clock(m, m.t)[0] is pyomo_fesd.clock(m.t)[0]
     m.s = dae.ContinuousSet(bounds=(0, 1))
-    assert pyomo_fesd.clock(m, m.s) is not pyomo_fesd.clock(m, m.t)
+    assert pyomo_fesd.clock(m, m.s)[0] is not pyomo_fesd.clock(m, m.t)[0]
     m.unit = pyo.Block()
-    assert pyomo_fesd.clock(m.unit, m.t) is pyomo_fesd.clock(m, m.t)
+    assert pyomo_fesd.clock(m.unit, m.t)[0] is pyomo_fesd.clock(m, m.t)[0]
+
+
+@pytest.mark.parametrize('clock', [lambda m: pyomo_fesd.clock(m.t), lambda m: pyomo_fesd.clock(m, m.t)])
+def test_a_clock_gets_a_name_as_any_component(clock):
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 2))
+    m.tau = clock(m)
+    m.x = pyo.Var(m.t, initialize=0.0)
+    m.dx = dae.DerivativeVar(m.x)
+    m.x[0].fix()
+    m.late = Disjunction(m.t, rule=lambda m, t: [[m.tau[t] <= 0.7, m.dx[t] == m.tau[t]], [m.tau[t] >= 0.7, m.dx[t] == -1]])
+    m = move(dcs(m), 3, 2).clone()
+    pyomo_fesd.simulate(m)
+    (switch,) = pyomo_fesd.switches(m)
+    assert switch.time == pytest.approx(0.7, abs=1e-12) and m.x[2].value == pytest.approx(0.245 - 1.3, abs=1e-12)
+    assert {t: m.tau[t].value for t in m.t} == pytest.approx(pyomo_fesd.physical_time(m), abs=1e-12)
 
 
 def test_a_clock_in_a_sub_block_with_its_own_time():
@@ -58,7 +74,7 @@ def test_a_clock_in_a_sub_block_with_its_own_time():
 def test_a_clone_has_its_own_clock():
     m = ramp()
     copy = m.clone()
-    assert pyomo_fesd.clock(copy).model() is copy
+    assert pyomo_fesd.clock(copy)[0].model() is copy
     for model in (copy, m):
         solve(transform(model, 6, 2))
         assert pyomo_fesd.switches(model)[0].time == pytest.approx(SWITCH, abs=1e-9)

@@ -15,6 +15,7 @@ from benchmarks.refinement import problems, run
 from hypothesis import given
 from hypothesis import strategies as st
 from pyomo.gdp import Disjunction
+from pyomo.opt import SolverFactory
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
@@ -23,9 +24,10 @@ from pyomo_fesd.refinement.dense_output import read_solution
 from pyomo_fesd.refinement.element_density import GROWTH, DensePiece, expected, next_numbers
 from pyomo_fesd.refinement.error_estimate import LEAST_ORDER, observed_order
 from pyomo_fesd.refinement.interpolated_start import start_from
+from pyomo_fesd.refinement.round_solver import RoundSolver
 from pyomo_fesd.refinement.trial_round import trial_round
 from tests.models import dcs, finite_elements, snapshot
-from tests.problems import held_control, setpoint
+from tests.problems import held_control, setpoint, simulations
 
 
 def decay(points=(0, 1, 10), rate=5.0):
@@ -413,3 +415,24 @@ def test_a_short_piece_needs_no_second_element_before_the_others_are_as_short():
     pieces = [DensePiece(0, 0.01, 1.0), DensePiece(0, 0.99, 1.0)]
     few, more = (expected([n], pieces, 5)[0] for n in (10, 20))
     assert few - more == pytest.approx((1 - 2**-5) * (0.99 / 0.1) * 0.1**6, rel=1e-3)
+
+
+def test_a_round_with_more_switches_than_elements_is_given_up_before_the_optimisation(monkeypatch):
+    """A thermostat with 9 switches in 3 elements: no NLP is spent on it."""
+    m = simulations.buck_hysteresis(end=2.0)
+    m.cost = pyo.Objective(expr=m.i[m.t.last()])
+    dcs(m, hysteresis=[m.switch])
+    solved, solve = [], RoundSolver._optimise
+
+    def watched(self, numbers, before):
+        started = len(solved)
+        monkeypatch.setattr(
+            'pyomo_fesd.refinement.round_solver.SolverFactory', lambda name: solved.append(name) or SolverFactory(name)
+        )
+        error = solve(self, numbers, before)
+        assert (error is None) == (len(solved) > started)
+        return error
+
+    monkeypatch.setattr(RoundSolver, '_optimise', watched)
+    found = pyomo_fesd.refine(m, tolerance=1e-3, nfe=2)
+    assert found.reached and 'used up' in found.table['note'].iloc[0]

@@ -3,6 +3,8 @@
 import io
 
 import bouncing_ball
+import numpy as np
+import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 import thermostat
@@ -12,6 +14,7 @@ from pyomo.contrib.solver.common.results import SolutionStatus
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
+from pyomo_fesd.mpcc.algorithm import hybrid
 from pyomo_fesd.solvers import simulated_start
 from tests.models import dcs, signum
 
@@ -90,6 +93,106 @@ def test_where_both_fail_the_reason_says_what_each_saw():
     assert [v.value for v in m.component_data_objects(pyo.Var)] == before
 
 
+@pytest.mark.parametrize('distance', [0.0, 1e-16, -1e-13, 1e-11, -1e-9, 1e-7])
+@pytest.mark.parametrize('rates', [(1.0, -0.7), (-1.0, 0.7)], ids=['attracts', 'repels'])
+def test_a_start_on_the_surface_or_near_it(rates, distance):
+    random = np.random.default_rng(1)
+    weights, x0 = random.uniform(-1, 1, 2), random.uniform(-1, 1, 2)
+    m = planar(weights, x0 + distance * weights, float(weights @ x0), rates)
+    results, _ = solve(m)
+    assert results.solution_status is SolutionStatus.optimal
+    assert results.extra_info.nlps <= 1
+
+
+def planar(weights, x0, level, rates):
+    """Two states; their rates depend on the side of a line, along ``weights``."""
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 1))
+    m.i = pyo.RangeSet(0, 1)
+    m.x = pyo.Var(m.t, m.i, initialize=lambda m, t, i: x0[i])
+    m.dx = dae.DerivativeVar(m.x, wrt=m.t)
+    for i in m.i:
+        m.x[0, i].fix()
+
+    @m.Disjunction(m.t)
+    def side(m, t):
+        c = sum(weights[i] * m.x[t, i] for i in m.i)
+        ode = [[m.dx[t, i] == rate * weights[i] - 0.1 * m.x[t, i] for i in m.i] for rate in rates]
+        return [[c <= level, *ode[0]], [c >= level, *ode[1]]]
+
+    return move(dcs(m), 4, 2)
+
+
+def test_the_reason_names_what_a_start_violates(monkeypatch):
+    def wrong(model, *args):
+        for t in model.t:
+            model.x[t].set_value(7.0)
+        return True
+
+    monkeypatch.setattr(simulated_start, '_registered', [wrong])
+    m = move(dcs(still()), 4, 2)
+    m.impossible = pyo.Constraint(expr=m.x[2] == 50)
+    results, log = solve(m, raise_exception_on_nonoptimal_result=False, load_solutions=False)
+    assert results.solution_status is not SolutionStatus.optimal
+    for text in (log, results.extra_info.reason):
+        assert "not accepted" in text and "is violated by" in text
+    assert 'largest violations: ' in results.extra_info.reason
+
+
+# Where the homotopy finds nothing
+
+
+def pushed_ball(target=0.5):
+    """A ball whose gravity is chosen so that it is at a height at the end; the homotopy finds no branch with two impacts."""
+    m = bouncing_ball.build(1.0, 2)
+    m.u = pyo.Var(bounds=(-2, 2), initialize=0)
+    m.fall.deactivate()
+    m.pushed_fall = pyo.Constraint(m.t, rule=lambda m, t: m.dv[t] == -bouncing_ball.GRAVITY + m.u)
+    m.cost = pyo.Objective(expr=(m.q[2] - target) ** 2 + 1e-3 * m.u**2)
+    return move(m, 8, 2)
+
+
+def test_a_homotopy_without_a_point_begins_again_at_a_simulation():
+    m = pushed_ball()
+    results, log = solve(m)
+    assert 'no feasible point, so simulated' in log
+    assert results.extra_info.stationarity == 'B'
+    assert len(times(m)) == 2 and m.u.value == pytest.approx(1.28241, abs=1e-3)
+
+
+def test_it_does_so_before_the_time_is_up(monkeypatch):
+    monkeypatch.setattr(hybrid, 'PATIENCE', 0.0)
+    results, log = solve(pushed_ball(), time_limit=30)
+    assert 'relaxation' not in log.split('no feasible point, so simulated')[0]
+    assert results.extra_info.stationarity == 'B'
+
+
+def test_a_path_that_paused_goes_on(monkeypatch):
+    monkeypatch.setattr(hybrid, 'PATIENCE', 0.0)
+    monkeypatch.setattr(simulated_start, '_registered', [lambda m, demanded, *args: demanded and fail(m)])
+    m = move(dcs(still(True)), 4, 2)
+    results, log = solve(m, time_limit=30)
+    assert 'without success: t: simulate: it cannot go on' in log
+    assert results.extra_info.stationarity == 'B' and times(m) == pytest.approx([2 / 3], abs=1e-6)
+
+
+def test_where_nothing_helps_the_reason_says_what_each_saw(monkeypatch):
+    monkeypatch.setattr(simulated_start, '_registered', [lambda m, demanded, *args: demanded and fail(m)])
+    m = move(dcs(still(True)), 4, 2)
+    m.impossible = pyo.Constraint(expr=m.x[2] == 50)
+    before = [v.value for v in m.component_data_objects(pyo.Var)]
+    results, _ = solve(m, raise_exception_on_nonoptimal_result=False, load_solutions=False)
+    reason = results.extra_info.reason
+    assert 'largest violations: ' in reason and 'simulate: it cannot go on' in reason
+    assert [v.value for v in m.component_data_objects(pyo.Var)] == before
+
+
+def test_the_older_interface_has_the_same_sentences():
+    m = move(bouncing_ball.build(1.0, 3), 2, 2)
+    message = pyo.SolverFactory('mpec_hybrid').solve(m, time_limit=20).solver.message
+    assert 'without success' in message and 'largest violations: ' in message
+
+
 def test_values_that_are_not_loaded_leave_the_model_alone():
     m = move(dcs(still()), 4, 2)
     before = [v.value for v in m.component_data_objects(pyo.Var)]
@@ -99,11 +202,13 @@ def test_values_that_are_not_loaded_leave_the_model_alone():
     assert times(m) == pytest.approx([2 / 3], abs=1e-6)
 
 
-def test_a_failure_of_the_simulation_is_no_failure(monkeypatch):
-    def fail(model, *args):
-        model.x[2].set_value(99.0)
-        raise FesdError('t', "simulate: it cannot go on", "take another model")
+def fail(model, *args):
+    """A simulation that fails."""
+    model.x[2].set_value(99.0)
+    raise FesdError('t', "simulate: it cannot go on", "take another model")
 
+
+def test_a_failure_of_the_simulation_is_no_failure(monkeypatch):
     monkeypatch.setattr(simulated_start, '_registered', [fail])
     m = move(dcs(still()), 4, 2)
     results, log = solve(m)

@@ -69,7 +69,7 @@ class DistinctFunctions:
         variation = F - F.mean()
         for k, known in enumerate(self.values):
             other = known - known.mean()
-            factor = (variation @ other) / (other @ other) if other.any() else 0
+            factor = _factor(variation, other)
             if factor and np.abs(F - factor * known).max() <= PROPORTIONAL * np.abs(variation).max() + 1e-14 * np.abs(F).max():
                 return k, int(np.sign(factor))
         self.values.append(F)
@@ -85,6 +85,15 @@ class DistinctFunctions:
         mean = F.mean(axis=0)
         A = null_space(F - mean, rcond=1e-10 + 1e-15 * np.abs(F).max()).T
         return AffineDependence(np.hstack([A, (A @ mean)[:, None]]))
+
+
+def _factor(variation, other):
+    """The factor by which ``variation`` is nearest to ``other``; squares of small numbers are 0 to the machine."""
+    size, other_size = np.abs(variation).max(), np.abs(other).max()
+    if not size or not other_size:
+        return 0.0
+    variation, other = variation / size, other / other_size
+    return (variation @ other) / (other @ other) * (size / other_size)
 
 
 class AffineDependence:

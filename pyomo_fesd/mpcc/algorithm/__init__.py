@@ -2,8 +2,8 @@
 
 Read in this order: ``state`` (the records of a run), ``hybrid`` (the algorithm as a whole), ``homotopy`` (the path of relaxations)
 with ``gap_test`` (when it may end) and ``recovery`` (when a relaxation fails), ``branches`` (branch NLPs and descent),
-``coincidences`` (every order of changes that fall together), ``search`` (depth first, as a last resort),
-``subsolves`` (limits, times and log of each NLP and LPEC), ``start_points``.
+``coincidences`` (every order of changes that fall together) with ``arrivals`` (those at an end), ``search`` (depth first, as a last
+resort), ``subsolves`` (limits, times and log of each NLP and LPEC), ``start_points``.
 """
 
 from pyomo_fesd.mpcc.algorithm.hybrid import HybridSolver

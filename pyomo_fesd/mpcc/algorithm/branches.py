@@ -99,13 +99,33 @@ class Branches:
                 if self.run.point.f < point.f - PROGRESS * max(1.0, abs(point.f)):
                     neighbours = list(self._c.neighbours)
 
+    def without_short(self, point):
+        """A better point in a neighbouring branch for a variable of ``point`` at its lower bound; None if there is none.
+
+        What a place of least extent holds is as small as the tolerances: the LPEC does not see that only the bound keeps it.
+        """
+        enough = point.f - PROGRESS * max(1.0, abs(point.f))
+        for neighbour in self._c.neighbours:
+            zero = self._zero_sides(point, neighbour) if neighbour.short.size else None
+            found = None if zero is None else self.certified(point.w, zero, max_iter=SECOND)
+            if _is_below(found, enough):
+                return found
+        return None
+
     def _widen_from(self, end):
         """Go on without guide bounds from a point below the incumbent that only these keep from descending."""
         if end is None or end.certificate.grade is not Stationarity.LIMITED:
             return
         if _is_below(end, self.run.point.f - PROGRESS * max(1.0, abs(self.run.point.f))) and self._c.widen():
-            zero = self._subsolves.sets(end.w, self._tolerances.biactive).zero
-            self.improve_from(self.certified(end.w, zero, max_iter=SECOND), True)
+            self._release(end)
+
+    def release(self):
+        """Go on from the incumbent, which guide bounds kept from descending, after these have been widened."""
+        self._release(self.run.point)
+
+    def _release(self, point):
+        zero = self._subsolves.sets(point.w, self._tolerances.biactive).zero
+        self.improve_from(self.certified(point.w, zero, max_iter=SECOND), True)
 
     def even_out(self):
         """From a certified incumbent with variables above their guide bounds, go to neighbouring branches where they are lower.

@@ -3,7 +3,8 @@
 In the incumbent the branches of all orders meet, but none of them is beside it for the LPEC: the place between two changes has no
 extent there.  For each order the incumbent is solved once more with such a place, of extent zero.  If the linearised problem of
 that branch descends, the place grows and leads to a better point; if it does not, or if there is no such branch, the order is
-settled.  A point with an order that is neither is not certified.
+settled.  A point with an order that is neither is not certified.  Changes at an end of a row of places coincide with the end
+(``arrivals``).
 """
 
 from collections.abc import Iterator
@@ -12,7 +13,8 @@ from functools import partial
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branches import AT_BOUND, PROGRESS, SECOND
+from pyomo_fesd.mpcc.algorithm.arrivals import NONE, Entered, branches
+from pyomo_fesd.mpcc.algorithm.branches import AS_GOOD, AT_BOUND, PROGRESS, SECOND
 from pyomo_fesd.mpcc.algorithm.state import Point
 from pyomo_fesd.mpcc.algorithm.subsolves import INFEASIBLE
 from pyomo_fesd.mpcc.nlp import NlpResult
@@ -48,6 +50,9 @@ class Coincidences:
                 self.run.point = before
             elif found is not OPEN:
                 self._branches.improve_from(found, True)
+                if not self.run.point.certificate.certified:
+                    # a better point may have changes that leave at the other end, or beside a place at its lower bound
+                    self._branches.try_neighbours()
             if found in (SETTLED, OPEN):
                 return
 
@@ -66,9 +71,12 @@ class Coincidences:
         tried, outcome = set(), SETTLED
         if self._is_flat(point):
             return SETTLED
+        better = self._branches.without_short(point)
+        if better is not None:
+            return better
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)
         for ways in self._orders(point.w, sets):
-            key = tuple((variable, zero.tobytes()) for variable, zero in ways)
+            key = tuple((way.extents.tobytes(), way.zero.tobytes()) for way in ways)
             if key in tried:
                 continue
             tried.add(key)
@@ -86,10 +94,10 @@ class Coincidences:
     @staticmethod
     def _first(attempt, ways):
         """The first outcome of equivalent ways that is not open."""
-        return next((found for found in (attempt(*way) for way in ways) if found is not OPEN), OPEN)
+        return next((found for found in (attempt(way) for way in ways) if found is not OPEN), OPEN)
 
     def _orders(self, w, sets) -> Iterator[list]:
-        """For each order the equivalent ways, each a variable that vanishes and the zero sides of the branch."""
+        """For each order the equivalent ways."""
         for coincidence, at in self._situations(w, sets):
             present = [change for change in coincidence.changes if _differs(change, at)]
             for some in _subsets(present, coincidence.fixed):
@@ -97,10 +105,12 @@ class Coincidences:
                 later = (coincidence.later, _moved(at.zero, [c.later for c in some]))
                 if coincidence.fixed:
                     earlier = (coincidence.earlier, _moved(at.zero, [c.earlier for c in some]))
-                    yield _possible(later)
-                    yield _possible(earlier)
+                    yield _possible(w, later)
+                    yield _possible(w, earlier)
                 else:
-                    yield _possible(later, (coincidence.earlier, _moved(at.zero, [c.earlier for c in rest])))
+                    yield _possible(w, later, (coincidence.earlier, _moved(at.zero, [c.earlier for c in rest])))
+        for entered in branches(self._c, w, sets, self._tolerances.biactive):
+            yield [] if entered is None else [entered]
 
     def _situations(self, w, sets) -> Iterator[tuple]:
         """Each coincidence with the active sets; also those as if the place beside it, at its lower bound, were none."""
@@ -113,38 +123,43 @@ class Coincidences:
                     zero = _moved(sets.zero, [getattr(change, direction) for change in others[variable].changes])
                     yield coincidence, ActiveSets(zero, np.zeros(len(zero), dtype=bool))
 
-    def _try(self, point, variable, zero):
-        """A better point in the branch ``zero``, in which ``variable`` may grow from 0; or the outcome."""
+    def _try(self, point, way):
+        """A better point in the branch of a way, in which its places may grow; or the outcome."""
         enough = self._tolerances.descent
-        with self._c.vanishing(variable):
-            start, beside = self._beside(point, variable, zero)
+        with self._c.vanishing(way.extents):
+            start, equal = self._beside(point, way)
             if start in (SETTLED, OPEN):
                 return start
-            equal, sets = beside, ActiveSets(zero, np.zeros(len(zero), dtype=bool))
+            if self._c.evaluate(start.w).f > point.f + AS_GOOD * max(1.0, abs(point.f)):
+                # another solution that does not meet the incumbent
+                return SETTLED
+            gamma = np.zeros(len(way.zero), dtype=bool)
+            gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
+            sets = ActiveSets(way.zero, gamma)
             step = self._subsolves.lpec(start.w, sets, self._tolerances.radius, equal, multipliers=-start.lam_g, enough=enough)
         if not step.solved:
             return OPEN
-        return SETTLED if step.descent <= enough else self._grown(point, start.w, step.d, zero)
+        return SETTLED if step.descent <= enough else self._grown(point, start.w, step.d, step.zero)
 
-    def _beside(self, point, variable, zero):
-        """The incumbent in the branch ``zero`` with ``variable`` = 0, and the decisions in force; or the outcome."""
-        start, most = point.w.copy(), np.full(len(point.w), np.inf)
-        start[variable] = most[variable] = 0.0
+    def _beside(self, point, way):
+        """The incumbent in the branch of a way, its places without extent, and the decisions in force; or the outcome."""
+        start, zero, most = way.start.copy(), way.zero, np.full(len(point.w), np.inf)
+        start[way.extents] = most[way.extents] = 0.0
         more = {'box': (-most, most), 'max_iter': PATIENCE}
-        more['box'][0][variable] = 0.0
+        more['box'][0][way.extents] = 0.0
         first = self._subsolves.attempt(start, zero, None, 1.0, **more)
         if first is None or first.status in INFEASIBLE:
             return SETTLED, None
-        apart = self._decides(point.w, variable)
+        apart = self._decides(point.w, way.extents)
         solved, equal = self._branches.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
         if first.solved and (solved is None or not solved.solved):
             # without decisions there is more room: an order that does not descend then does not descend with them
             solved, equal = self._subsolves.attempt(first.w, zero, None, 0.0, **more), np.zeros_like(apart)
         return (solved, equal) if solved is not None and solved.solved else (OPEN, None)
 
-    def _decides(self, w, variable):
-        """The decisions that involve a variable: beside a place of extent zero nothing is decided, as changes lie on both sides."""
-        return self._c.gradients(w)[-1][:, [variable]].toarray().ravel() != 0.0
+    def _decides(self, w, variables):
+        """The decisions that involve variables: beside a place of extent zero nothing is decided, as changes lie on both sides."""
+        return (self._c.gradients(w)[-1][:, variables].toarray() != 0.0).any(axis=1)
 
     def _grown(self, point, w, d, zero):
         """A point in the branch that is better than the incumbent; or OPEN."""
@@ -182,6 +197,6 @@ def _moved(zero, moves):
     return found
 
 
-def _possible(*ways):
+def _possible(w, *ways):
     """Without those for which there is no place."""
-    return [(variable, zero) for variable, zero in ways if variable is not None]
+    return [Entered(np.array([variable]), zero, w, NONE) for variable, zero in ways if variable is not None]

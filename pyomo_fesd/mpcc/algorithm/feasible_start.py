@@ -14,8 +14,11 @@ from pyomo_fesd.mpcc.subproblems import active_sets
 EXACT = 1e-9
 
 
-def feasible_start(c, subsolves, w) -> Point | None:
-    """The start ``w``, or the solution of its branch, as a Point; None if it is not feasible or its branch has no solution.
+def feasible_start(c, subsolves, w) -> tuple[Point | None, str]:
+    """The start ``w``, or the solution of its branch, as a Point, or None and the reason.
+
+    Rows whose variables the branch fixes, such as those of the first time, may be violated by ``feasibility_tol``: nothing else can
+    reduce them.
 
     Parameters
     ----------
@@ -24,19 +27,33 @@ def feasible_start(c, subsolves, w) -> Point | None:
     subsolves : Subsolves
     """
     if not c.eta.numel() and not c.penalty.is_constant():
-        # only the penalty chooses among the solutions
-        return None
+        return None, "only the penalty chooses among the solutions"
     found = subsolves.measure(w)
     if not found.feasible:
-        return None
+        return None, f"not feasible: {_most_violated(c, w)}"
     at, tolerances = c.evaluate(w), subsolves.tolerances
     equal = at.eta > tolerances.eta
     if max(found.violation_scaled, found.complementarity_scaled) <= EXACT and not np.any(np.abs(c.decided(w))[equal] > EXACT):
         nlp = NlpResult(w, at.f, 'start', 0, np.zeros(len(c.lbg)), np.zeros(len(w)))
     else:
         zero = active_sets(at.G, at.H, tolerances.biactive).zero
-        nlp = subsolves.branch(w, zero, equal, 0.0)
+        nlp = subsolves.branch(w, zero, equal, 0.0, settled=tolerances.feasibility)
     if nlp is None:
-        return None
+        return None, f"its branch has no solution: {_most_violated(c, w, equal)}"
     certificate = subsolves.certify(nlp, equal)
-    return Point(nlp, at.f, certificate, equal) if certificate.certified else None
+    return (Point(nlp, at.f, certificate, equal), '') if certificate.certified else (None, certificate.grade.value)
+
+
+def _most_violated(c, w, equal=False):
+    """The name of the row, bound or pair that ``w`` violates most, also among the decisions ``equal``, and by how much."""
+    at = c.evaluate(w)
+    rows, bounds = c.violations(w, at)
+    pairs, decided = np.abs(np.minimum(at.G, at.H)), np.abs(c.decided(w)) * equal
+    amounts = np.concatenate([rows, bounds, pairs, decided])
+    if not amounts.size:
+        return "it has no rows"
+    k = int(np.argmax(np.where(np.isnan(amounts), np.inf, amounts)))
+    components = [*c.constraints, *c.variables, *c.conditions, *(d.constraint for d in c.decisions)]
+    # copies in other processes are without components
+    name = components[k].name if components else f"row {k}"
+    return f"'{name}' is violated by {amounts[k]:.1e}"

@@ -4,7 +4,7 @@ As soon as the active sets of a relaxation look settled, the branch NLP that the
 objective promises less than the incumbent's (gap test), and eps may rise again when a relaxation fails.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,7 @@ ROUND_OFF = 1.001
 @dataclass(frozen=True)
 class _Position:
     """A position: the path's number, start and eps; form, result and active sets of the relaxation before, and the objective of
-    the branch that they named.
+    the branch that they named; whether the relaxation goes on from where its budget of iterations ended.
     """
 
     path: int
@@ -44,6 +44,7 @@ class _Position:
     duals: NlpResult = None
     sets: ActiveSets = None
     named: float = None
+    goes_on: bool = False
 
 
 class Homotopy:
@@ -73,26 +74,35 @@ class Homotopy:
         form = self._options.relaxation
         self._paths = AUTO[self._c.has_objective] if form == 'auto' else ((form,) * 2,)
         self._recoveries = list(RECOVERIES)
+        self._position = _Position(0, start, self._options.eps_init)
         self.end, self.finished = None, False
 
-    def follow(self):
-        """Run until the incumbent is settled or nothing is left to try."""
-        position = _Position(0, self._start, self._options.eps_init)
-        while position is not None:
-            self.run.eps = position.eps
-            relaxed = self._relax(position)
+    def follow(self, patience=None):
+        """Run until the incumbent is settled or nothing is left to try.
+
+        After the Deadline ``patience`` it pauses while there is no feasible point; the next call goes on.
+        """
+        while self._position is not None and not (patience is not None and patience.expired() and self.run.point is None):
+            self.run.eps = self._position.eps
+            relaxed = self._relax(self._position)
             self._subsolves.keep_least_infeasible(relaxed.w)
-            position = (self._next if self._subsolves.usable(relaxed) else self._recover)(position, relaxed)
+            step = self._next if self._subsolves.usable(relaxed) else self._recover
+            self._position = step(self._position, relaxed)
 
     def _relax(self, position):
-        form = self._form(position)
-        duals = position.duals if position.eps <= WITH_MULTIPLIERS * ROUND_OFF and position.form == form else None
-        # all iterations of the solver for a cold start on the last path, or where the user has set their number
-        last_cold = duals is None and position.path + 1 == len(self._paths)
-        unlimited = last_cold or 'max_iter' in self._options.nlp_options
-        return self._subsolves.relax(
-            form, position.w, position.eps, duals, None if unlimited else self._options.relaxation_iterations
-        )
+        form, duals = self._form(position), self._duals(position)
+        budget = None if self._unlimited(position) else self._options.relaxation_iterations
+        return self._subsolves.relax(form, position.w, position.eps, duals, budget)
+
+    def _duals(self, position):
+        """The multipliers to start from, or None."""
+        late = position.eps <= WITH_MULTIPLIERS * ROUND_OFF
+        return position.duals if late and position.form == self._form(position) and not position.goes_on else None
+
+    def _unlimited(self, position):
+        """All iterations of the solver for a cold start on the last path, or where the user has set their number."""
+        last_cold = self._duals(position) is None and position.path + 1 == len(self._paths)
+        return last_cold or 'max_iter' in self._options.nlp_options
 
     def _form(self, position):
         first, later = self._paths[position.path]
@@ -106,7 +116,13 @@ class Homotopy:
         """The position after a relaxation that failed; None after the last recovery, or with a certified incumbent."""
         self.finished = False
         self._after(self.run)
-        if not self._recoveries or self._certified() or self._hopeless():
+        if self._certified():
+            return None
+        if relaxed.stopped and not position.goes_on and not self._unlimited(position):
+            # Ipopt's own centring finds its way again where its iterations have led
+            self._subsolves.note("go on", relaxed.w)
+            return replace(position, w=relaxed.w, goes_on=True)
+        if not self._recoveries or self._hopeless():
             return None
         if self._fails_at_once(position):
             return self._begin(position.path + 1, "start again, other form", relaxed)
@@ -171,6 +187,10 @@ class Homotopy:
         if self._certified() or self._hopeless():
             return None
         wider = self._stopped_by_guide_bounds() and self._c.widen()
+        if wider and self.run.point is not None:
+            self._branches.release()
+            if self._certified():
+                return None
         path = position.path + (not wider)
         if path == len(self._paths):
             return None

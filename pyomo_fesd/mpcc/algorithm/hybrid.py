@@ -15,8 +15,12 @@ from pyomo_fesd.mpcc.algorithm.start_points import start_point
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Run, Setup, Stop, Tolerances
 from pyomo_fesd.mpcc.algorithm.subsolves import Subsolves
 
+#: Part of the time limit after which a homotopy without a feasible point pauses for a further start.
+PATIENCE = 0.5
 #: Other starts of a problem with few pairs, before it is called infeasible.
 RESTARTS = 3
+#: Times that a better order of changes is made even again.
+ROUNDS = 3
 
 
 def few_pairs(compiled) -> bool:
@@ -72,16 +76,13 @@ class HybridSolver:
         if self._starts_at_a_solution():
             return Outcome.SOLVED
         if not (self._options.warm_start and self._from_values()):
-            self._path(self._c.x0, self._branches).follow()
-            if self._start_is_better():
-                self._branches.explore_from(self._c.x0, False)
+            self._follow_path()
             if self.run.point is not None and self._c.has_objective:
                 self._branches.try_neighbours()
         if self.run.point is None:
             self._search_everywhere()
         self._c.widen()
-        self._branches.even_out()
-        self._coincidences.settle()
+        self._settle()
         point = self.run.point
         if point is None:
             return Outcome.INFEASIBLE
@@ -89,12 +90,48 @@ class HybridSolver:
             return Outcome.FEASIBLE
         return Outcome.CERTIFIED if self._c.has_objective else Outcome.SOLVED
 
+    def _settle(self):
+        """Go to more even solutions and try all orders of changes, until neither leads on."""
+        for _ in range(ROUNDS):
+            self._branches.even_out()
+            before = self.run.point
+            self._coincidences.settle()
+            if self.run.point is before:
+                return
+
+    def _follow_path(self):
+        """The homotopy from the start; where it finds no feasible point, from a further start."""
+        path = self._path(self._c.x0, self._branches)
+        further = self._setup.further_start
+        path.follow(None if further is None else self._setup.deadline.part(PATIENCE))
+        if self._start_is_better():
+            self._branches.explore_from(self._c.x0, False)
+        if self.run.point is None and further is not None:
+            self._start_further(*further())
+        if self.run.point is None:
+            path.follow()
+
+    def _start_further(self, w, note):
+        """The branch of another start, or a path from there."""
+        if note:
+            self._subsolves.note(note, self._c.x0 if w is None else w)
+        if w is None:
+            return
+        self._branches.forget()
+        self._gap.restart()
+        self._subsolves.keep_least_infeasible(w)
+        self._branches.explore_from(w, True)
+        if self.run.point is None:
+            self._path(w, self._branches).follow()
+
     def _starts_at_a_solution(self):
         """Whether there is no objective and the start is feasible already."""
         if self._c.has_objective:
             return False
         narrow = self._c.widen()
-        self.run.point = feasible_start(self._c, self._subsolves, self._c.x0)
+        self.run.point, self.run.refused = feasible_start(self._c, self._subsolves, self._c.x0)
+        if self.run.refused and self._options.warm_start:
+            self._subsolves.note(f"start not accepted, {self.run.refused}", self._c.x0)
         if narrow:
             self._c.narrow()
         return self.run.point is not None

@@ -46,6 +46,8 @@ class Setup:
         called with the LogEntry of each NLP and LPEC, or with the Start of each of several starts
     after : callable
         called with the Run after every outer iteration; may raise Stop
+    further_start : callable or None
+        returns another start (array), or None, and a note for the log; called once where the homotopy finds no feasible point
     """
 
     compiled: object
@@ -55,6 +57,7 @@ class Setup:
     cache: object
     show: Callable
     after: Callable
+    further_start: Optional[Callable] = None
 
 
 @dataclass(frozen=True)
@@ -157,6 +160,8 @@ class Run:
     steps : list of LogEntry
     starts : list of Start
         if there were several; counts are those of all, everything else is the best one's
+    refused : str
+        why the start values are no solution, where there is no objective
     """
 
     outcome: Optional[Outcome] = None
@@ -166,3 +171,4 @@ class Run:
     eps: Optional[float] = None
     steps: list = field(default_factory=list)
     starts: list = field(default_factory=list)
+    refused: str = ''

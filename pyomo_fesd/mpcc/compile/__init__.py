@@ -2,8 +2,8 @@
 
 Read in this order: ``read_mpcc`` (the model as pairs, decisions and hints), ``compile`` (the way through the NL file),
 ``parameters`` (symbols for values that may change), ``auxiliary_rows`` (rows for sides and terms), ``nl_file``, ``nl_index`` (where
-the file has each of them), ``scaling``, ``natural_units`` (factors from the
-model's own numbers), ``assemble``, ``model_values`` (bounds and starts), ``mpcc_functions`` (the result),
+the file has each of them), ``round_off`` (constants in which fixed values cancel), ``scaling``, ``sizes`` and ``natural_units``
+(factors from the model's own numbers), ``assemble``, ``model_values`` (bounds and starts), ``mpcc_functions`` (the result),
 ``derivatives`` (chain rule for all NLPs), ``staleness`` (changes of the model after it was compiled).
 """
 

@@ -10,12 +10,12 @@ import numpy as np
 from pyomo.core import maximize
 from scipy import sparse
 
+from pyomo_fesd.mpcc.compile.arrival_indices import arrival_indices, both_positions, moves, positions_of
 from pyomo_fesd.mpcc.compile.model_values import ModelValues, start_values, stated_bounds
 from pyomo_fesd.mpcc.compile.mpcc_functions import (
     ChangeIndices,
     CoincidenceIndices,
     FollowerIndices,
-    MoveIndices,
     MpccData,
     MpccFunctions,
     NeighbourIndices,
@@ -25,12 +25,11 @@ from pyomo_fesd.mpcc.compile.mpcc_functions import (
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.nl_index import NlIndex
 from pyomo_fesd.mpcc.compile.parameters import parameter_values
+from pyomo_fesd.mpcc.compile.round_off import EXACT, parameter_terms
 from pyomo_fesd.mpcc.compile.scaling import Scale, side_factors
 from pyomo_fesd.mpcc.compile.sizes import row_factors, variable_factors, without_small
 
 UNBOUNDED = (-np.inf, np.inf)
-#: Constants of linearised rows below this part of their terms are rounding errors.
-EXACT = 1e-13
 #: Variables of a nonlinear model that may be scaled by coefficients.
 SMALL = 100
 #: By what variables and rows without a factor of the user are scaled: see ``compile_mpcc``.
@@ -92,10 +91,13 @@ def _assembled(problem, entries, nl, symbols, factors, index, by_starts, units=N
         tentative=np.array([d.tentative for d in problem.decisions], dtype=bool),
         neighbours=_neighbours(problem.hints.neighbour_branches, *positions, s_x),
         coincidences=[_coincidence(hint, *positions) for hint in problem.hints.coincidences],
+        arrivals=arrival_indices(problem.hints.arrivals, *positions),
         followers=_followers(problem.hints.followers, positions[0]),
         **values.read(),
     )
-    outputs = _outputs(index, f, rows, stack, S, scale)
+    gauges = take(stack, index.gauges)
+    gauges = gauges * _factors_of_expressions(gauges, (w, p), (start * s_x, at[1]), np.ones(gauges.numel()))
+    outputs = _outputs(index, f, rows, stack, S, scale, gauges)
     return MpccFunctions(w, p, outputs, data, variables, constraints, conditions, problem.decisions, values)
 
 
@@ -105,22 +107,37 @@ def _factors_by_size(nl, index, sides, at, variables, given_x, given_g, hints):
     all_rows = ca.vertcat(rows, take(stack, sides))
     function = ca.Function('rows', [w, p], [all_rows, ca.jacobian(all_rows, w)])
     bounds = np.concatenate([nl.lbg[index.model_rows], np.zeros(len(sides))])
-    J, constants = _linearised(function, without_small(at[0]), at[1], bounds)
+    begin = without_small(at[0])
+    cancelling = np.concatenate([nl.cancelling[index.model_rows], _of_rows(nl.cancelling, sides)])
+    cancelling = np.maximum(cancelling, parameter_terms(all_rows, w, p, begin, at[1]))
+    J, constants = _linearised(function, begin, at[1], bounds, cancelling)
+    # sides are zero at solutions, and so may be what is left of them
+    certain = constants.copy()
+    certain[len(index.model_rows) :] = without_small(certain[len(index.model_rows) :])
     columns = {id(v): j for j, v in enumerate(variables)}
     alike = [[columns[id(v)] for v in group if id(v) in columns] for group in hints.alike]
-    s_x = variable_factors(J, constants, at[0], stated_bounds(variables), given_x, [group for group in alike if group])
+    s_x = variable_factors(J, (certain, constants), at[0], stated_bounds(variables), given_x, [group for group in alike if group])
     J = csr(function(*at)[1])[: len(index.model_rows)]
     return s_x, row_factors(J @ sparse.diags(1 / s_x), given_g)
 
 
-def _linearised(function, w, p, bounds):
-    """Jacobian of rows and their distances from ``bounds`` where the variables are 0, without rounding errors."""
+def _of_rows(values, addresses):
+    """The values (one each row of the file) of those addresses that are rows, 0 for the others."""
+    is_row = (addresses >= 0) & (addresses < len(values))
+    return np.where(is_row, np.append(values, 0.0)[np.where(is_row, addresses, -1)], 0.0)
+
+
+def _linearised(function, w, p, bounds, cancelling):
+    """Jacobian of rows, and the sizes of their distances from ``bounds`` where the variables are 0, without rounding errors.
+
+    A constant in which terms of the sizes ``cancelling`` cancel has their size.
+    """
     values, J = function(w, p)
     J = csr(J)
     found = np.asarray(values, dtype=float).ravel() - J @ w
-    constants = found - np.where(np.isfinite(bounds), bounds, 0.0)
-    exact = np.abs(constants) > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
-    return J, np.where(exact, constants, 0.0)
+    constants = np.abs(found - np.where(np.isfinite(bounds), bounds, 0.0))
+    exact = constants > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
+    return J, np.maximum(np.where(exact, constants, 0.0), cancelling)
 
 
 def _substitute(nl, index, s_x):
@@ -159,14 +176,14 @@ def _are_sides(sides, index):
     return among[index.free]
 
 
-def _outputs(index, f, rows, stack, S, scale):
+def _outputs(index, f, rows, stack, S, scale, gauges):
     """The functions of the MPCC, in the order of ``MpccFunctions.NAMES``."""
     S, q = S * scale.sides, S.numel() // 2
     # term by term: the sum's order is that of the terms
     penalty = sum((stack[int(k)] for k in index.penalty), ca.SX(0))
     eta, equal = take(stack, index.eta), take(stack, index.equal)
     f = _without(f, scale.offset)
-    return [f * scale.f, penalty * scale.f, rows * scale.g, S[:q], S[q:], eta, equal]
+    return [f * scale.f, penalty * scale.f, rows * scale.g, S[:q], S[q:], eta, equal, gauges]
 
 
 def _without(f, offset):
@@ -213,14 +230,14 @@ def _followers(followers, pairs):
 
 def _neighbour(branch, pairs, columns, s_x):
     """One of them; ``pairs`` and ``columns`` are positions by the id of a component, which need not have any."""
-    targets, sources = _both_positions(branch.takes_over, pairs)
+    targets, sources = both_positions(branch.takes_over, pairs)
     starts = {columns[id(v)][0]: start for v, start in branch.starts if id(v) in columns}
     at = np.array(list(starts), dtype=int)
     return NeighbourIndices(
         targets,
         sources,
-        ended=_positions(branch.first_side_zero, pairs),
-        short=_positions(branch.if_at_lower_bound, columns),
+        ended=positions_of(branch.first_side_zero, pairs),
+        short=positions_of(branch.if_at_lower_bound, columns),
         starts=at,
         at=np.array(list(starts.values()), dtype=float) * s_x[at],
     )
@@ -228,23 +245,8 @@ def _neighbour(branch, pairs, columns, s_x):
 
 def _coincidence(hint, pairs, columns):
     changes = tuple(
-        ChangeIndices(*_both_positions(change.differing, pairs), _move(change.later, pairs), _move(change.earlier, pairs))
+        ChangeIndices(*both_positions(change.differing, pairs), moves(change.later, pairs), moves(change.earlier, pairs))
         for change in hint.changes
     )
     later, earlier = (None if v is None or id(v) not in columns else columns[id(v)][0] for v in (hint.later, hint.earlier))
     return CoincidenceIndices(changes, later, earlier, hint.fixed)
-
-
-def _move(moved, pairs):
-    taken = _both_positions([(pair, source) for pair, source in moved if source is not None], pairs)
-    return MoveIndices(*taken, _positions([pair for pair, source in moved if source is None], pairs))
-
-
-def _both_positions(hints, pairs):
-    """Positions of the first and of the second components of some couples, where both have any."""
-    found = [both for couple in hints for both in zip(*(pairs.get(id(component), ()) for component in couple))]
-    return tuple(np.array(found, dtype=int).reshape(-1, 2).T)
-
-
-def _positions(components, positions):
-    return np.array([k for c in components for k in positions.get(id(c), ())], dtype=int)

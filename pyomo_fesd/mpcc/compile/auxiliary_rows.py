@@ -35,6 +35,7 @@ class Entries:
     G, H : lists, one entry each condition
     eta, equal : lists, one entry each decision
     penalty : list, one entry each term
+    gauges : list, one entry each value that tells whether a change is at an end of a row
     present : list, rows that only keep variables in the file
     splits : list of (VarData, VarData, expression), auxiliary variables as in ``ModelValues``
     """
@@ -45,6 +46,7 @@ class Entries:
     eta: list
     equal: list
     penalty: list
+    gauges: list
     present: list
     splits: list
 
@@ -82,6 +84,7 @@ class _Rows:
             eta=[self._entry(d.eta) for d in problem.decisions],
             equal=[self._entry(d.constraint.body - d.constraint.upper) for d in problem.decisions],
             penalty=[self._entry(term.weight * term.expression.expr) for term in problem.hints.penalties],
+            gauges=[self._shared_entry(gauge) for arrival in problem.hints.arrivals for gauge in arrival.gauges()],
             # the NL writer drops variables that no row contains
             present=[self._keep(self._symbols.variables), self._keep(G + H)],
             splits=self._splits,

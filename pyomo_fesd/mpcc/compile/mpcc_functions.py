@@ -45,6 +45,7 @@ class MpccData:
     scale : Scale
     neighbours : list of NeighbourIndices
     coincidences : list of CoincidenceIndices
+    arrivals : list of ArrivalIndices
     followers : FollowerIndices
     tentative : bool array, decisions that are dropped where they leave no solution
     """
@@ -65,6 +66,7 @@ class MpccData:
     scale: object
     neighbours: list
     coincidences: list
+    arrivals: list
     followers: object
     tentative: np.ndarray
 
@@ -126,6 +128,47 @@ class CoincidenceIndices:
     fixed: bool
 
 
+@dataclass(frozen=True, eq=False)
+class PlaceIndices:
+    """A ``Place`` by positions; ``extent`` is None where it is given."""
+
+    extent: int | None
+    inside: MoveIndices
+    between: MoveIndices
+
+
+@dataclass(frozen=True, eq=False)
+class ToggleIndices:
+    """A ``Toggle`` by positions of pairs and gauges; ``first`` and ``second`` may be None; ``swapped`` belongs to ``with_them``."""
+
+    pairs: np.ndarray
+    first: int | None
+    second: int | None
+    with_them: np.ndarray
+    swapped: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class OptionIndices:
+    """An ``Option`` by positions: gauges, pairs with the side that is required, pairs with the side they get, open pairs."""
+
+    gauges: np.ndarray
+    required: np.ndarray
+    required_sides: np.ndarray
+    pairs: np.ndarray
+    sides: np.ndarray
+    either: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ArrivalIndices:
+    """An ``Arrival`` by positions; arrivals at one end share their ``rows``, one or two tuples of PlaceIndices."""
+
+    rows: tuple
+    toggles: tuple
+    options: tuple
+
+
 @dataclass(frozen=True)
 class FollowerIndices:
     """All ``Follower`` by positions of pairs.
@@ -147,7 +190,7 @@ class MpccFunctions:
     Parameters
     ----------
     x, p : SX, symbols of the variables w (n) and of the parameters (l)
-    outputs : list of SX, in terms of these: f, penalty, g (m), G, H (q), eta, equal (one each decision)
+    outputs : list of SX, in terms of these: f, penalty, g (m), G, H (q), eta, equal (one each decision), gauges
     data : MpccData
     variables : list of VarData, length n
     constraints : list of ConstraintData, length m (rows of g)
@@ -158,10 +201,11 @@ class MpccFunctions:
 
     Attributes
     ----------
-    x : SX (n);  p : SX (l);  f, penalty : SX scalars;  g : SX (m);  G, H : SX (q);  eta, equal : SX (one each decision)
+    x : SX (n);  p : SX (l);  f, penalty : SX scalars;  g : SX (m);  G, H : SX (q);  eta, equal : SX (one each decision);
+    gauges : SX (one each)
     """
 
-    NAMES = ('f', 'penalty', 'g', 'G', 'H', 'eta', 'equal')
+    NAMES = ('f', 'penalty', 'g', 'G', 'H', 'eta', 'equal', 'gauges')
 
     def __init__(self, x, p, outputs, data, variables=(), constraints=(), conditions=(), decisions=(), model_values=None):
         self._data = data
@@ -181,6 +225,10 @@ class MpccFunctions:
     @cached_property
     def _equal(self):
         return ca.Function('equal', [self.x, self.p], [ca.densify(self.equal)])
+
+    @cached_property
+    def _gauges(self):
+        return ca.Function('gauges', [self.x, self.p], [ca.densify(self.gauges)])
 
     @cached_property
     def _gradients(self):
@@ -207,6 +255,10 @@ class MpccFunctions:
         self._data = replace(self._data, **self._model_values.read())
         self.__dict__.update(vars(self._data))
 
+    def present_values(self):
+        """The variables' present values in the model, projected to their bounds."""
+        return self._model_values.read()['x0']
+
     def narrow(self):
         """Let branches, too, have the lower guide bounds."""
         self.lbx = self.guide_lbx
@@ -217,10 +269,10 @@ class MpccFunctions:
         return bool((narrow > self.lbx).any())
 
     @contextmanager
-    def vanishing(self, variable):
-        """Within the body, the least value of a variable is 0, and the others have their own bounds."""
+    def vanishing(self, variables):
+        """Within the body, the least value of ``variables`` is 0, and the others have their own bounds."""
         kept, self.lbx = self.lbx, self._data.lbx.copy()
-        self.lbx[variable] = 0.0
+        self.lbx[variables] = 0.0
         try:
             yield
         finally:
@@ -240,6 +292,10 @@ class MpccFunctions:
     def decided(self, w):
         """The residuals of the decisions' equations at ``w``."""
         return np.asarray(self._equal(w, self.parameters), dtype=float).ravel()
+
+    def measured(self, w):
+        """The gauges at ``w``."""
+        return np.asarray(self._gauges(w, self.parameters), dtype=float).ravel()
 
     def gradients(self, w):
         """Gradient of f (array) and Jacobians of g, G, H and the decisions' equations (scipy csr) at ``w``."""

@@ -21,6 +21,7 @@ from scipy import sparse
 from scipy.sparse.linalg import lsqr
 
 from pyomo_fesd.mpcc.compile.mpcc_functions import csr
+from pyomo_fesd.mpcc.compile.round_off import parameter_terms
 from pyomo_fesd.mpcc.compile.scaling import MILD
 
 #: Variables of a size within these bounds keep their unit.
@@ -184,17 +185,21 @@ def _evidence(c):
     at, q = c.evaluate(points[0]), len(c.side_of)
     values = np.concatenate([at.g, at.G, at.H])
     bounds = [np.concatenate([b, np.zeros(q)]) for b in (c.lbg, c.ubg)]
-    parts = [_linear(here, there, values, bounds, points[0]), _quadratic(c, len(values))]
+    cancelling = parameter_terms(ca.vertcat(c.g, c.G, c.H), c.x, c.p, points[0], c.parameters)
+    parts = [_linear(here, there, values, bounds, points[0], cancelling), _quadratic(c, len(values))]
     return _Evidence.of(*(np.concatenate(arrays) for arrays in zip(*parts)))
 
 
-def _linear(here, there, values, bounds, w):
-    """(row, variable, none, number) of the coefficients that are equal in two Jacobians, and of what is left in linear rows."""
+def _linear(here, there, values, bounds, w, cancelling):
+    """(row, variable, none, number) of the coefficients that are equal in two Jacobians, and of what is left in linear rows.
+
+    ``cancelling`` are the sizes of terms without variables.
+    """
     n, changed = len(w), abs(here - there).tocoo()
     changed = sparse.csr_matrix((changed.data != 0, (changed.row, changed.col)), here.shape)
     fixed = (here - here.multiply(changed)).tocoo()
     varies = np.asarray(changed.sum(axis=1)).ravel() > 0
-    terms, sizes = here @ w, abs(here) @ np.abs(w)
+    terms, sizes = here @ w, abs(here) @ np.abs(w) + cancelling
     left = values - terms
     left = np.where(np.abs(left) > ROUND_OFF * np.maximum(np.abs(values), sizes), left, 0.0)
     left = np.where(varies, 0.0, left)

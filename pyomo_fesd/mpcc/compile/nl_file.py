@@ -15,6 +15,7 @@ from pyomo.repn.plugins.nl_writer import NLWriter
 
 from pyomo_fesd.core import DeferredInterrupt, FesdError, withheld_messages
 from pyomo_fesd.mpcc.compile.model_values import start_value
+from pyomo_fesd.mpcc.compile.round_off import without_round_off
 
 #: Nodes, and names of unary functions, that casadi's NL reader cannot evaluate.
 UNSUPPORTED_NODES = (ExternalFunctionExpression, Expr_ifExpression)
@@ -32,7 +33,9 @@ class NlModel:
     variables : list of VarData (n);  constraints : list of ConstraintData (m), in the order of the file
     function : casadi Function (x) -> f, g, on SX
     lbg, ubg : arrays (m)
-        constants of linear rows are part of their bounds
+        constants of linear rows are part of their bounds, without round-off
+    cancelling : array (m)
+        sizes of the terms of fixed values that cancel in small constants, else 0
     """
 
     variables: list
@@ -40,6 +43,7 @@ class NlModel:
     function: object
     lbg: np.ndarray
     ubg: np.ndarray
+    cancelling: np.ndarray
 
 
 def folder_for(folder):
@@ -154,7 +158,7 @@ def read(model, symbols, path, variables, constraints):
     except RuntimeError as error:
         raise _unsupported(model, symbols, error) from None
     function = ca.Function('nl', [ca.vertcat(*nl.x)], [nl.f, ca.vertcat(*nl.g)]).expand()
-    return NlModel(variables, constraints, function, np.array(nl.g_lb, dtype=float), np.array(nl.g_ub, dtype=float))
+    return NlModel(variables, constraints, function, *without_round_off(constraints, nl.g_lb, nl.g_ub))
 
 
 def _unsupported(model, symbols, error):

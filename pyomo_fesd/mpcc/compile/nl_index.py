@@ -11,7 +11,7 @@ from pyomo.common.collections import ComponentMap
 from pyomo.core import value
 
 #: The lists of ``Entries`` that have addresses.
-GROUPS = ('G', 'H', 'eta', 'equal', 'penalty', 'present')
+GROUPS = ('G', 'H', 'eta', 'equal', 'penalty', 'gauges', 'present')
 
 
 class NlIndex:
@@ -19,7 +19,7 @@ class NlIndex:
 
     Attributes
     ----------
-    G, H : int arrays (q), addresses;  eta, equal : one each decision;  penalty : one each term
+    G, H : int arrays (q), addresses;  eta, equal : one each decision;  penalty : one each term;  gauges : one each gauge
     size : int, number of variables in the file
     parameters : int array (l), variables of the file that are parameters
     free : int array, its other variables

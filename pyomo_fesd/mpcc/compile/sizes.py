@@ -6,12 +6,12 @@ them.  The size of a variable is, in this order,
 * the inverse of its factor, where the user gives one;
 * its largest start value, or that of the variables ``alike`` (the same quantity at other places), unless that is small: what is
   zero at a solution starts at any small number in the next solve;
-* by its rows: s_j = (min_i max_i)^(1/2) of max(|b_i|, max_k |J_ik| s_k)/|J_ij| over the rows i with terms of known size.
+* by its rows: s_j = (min_i max_i)^(1/2) of max(b_i, max_k |J_ik| s_k)/|J_ij| over the rows i with terms of known size.
 
 Variables of a mild size keep the factor 1, and so do rows whose largest gradient entry is mild; others get the inverse, as a power
 of 2, which no rounding follows.
 
-Takes: the Jacobian J and the constants b of all rows and sides at the start.
+Takes: the Jacobian J and the sizes b of the constants of all rows and sides at the start.
 Leaves: factors.
 Does not apply: to the objective.
 """
@@ -33,14 +33,14 @@ def without_small(start: np.ndarray) -> np.ndarray:
     return np.where(np.abs(start) < MILD_SIZES[0], 0.0, start)
 
 
-def variable_factors(J, b: np.ndarray, start: np.ndarray, bounds: tuple, given: np.ndarray, alike: Sequence) -> np.ndarray:
+def variable_factors(J, constants: Sequence, start: np.ndarray, bounds: tuple, given: np.ndarray, alike: Sequence) -> np.ndarray:
     """Return the factors of the variables.
 
     Parameters
     ----------
     J : csr (rows, n)
-    b : array (rows)
-        constants of the linearised rows
+    constants : list of arrays (rows)
+        sizes of the constants of the linearised rows; the later ones count for variables without a size by the earlier ones
     start : array (n)
     bounds : (array, array)
         which are mild where a variable may have any value between them
@@ -57,7 +57,9 @@ def variable_factors(J, b: np.ndarray, start: np.ndarray, bounds: tuple, given: 
     bounded = np.maximum(np.abs(bounds[0]), np.abs(bounds[1]))
     mild = (sizes == 0) & (bounded >= MILD_SIZES[0]) & (bounded <= MILD_SIZES[1])
     sizes[mild] = bounded[mild]
-    sizes = np.minimum(_spread(abs(J).tocsr(), np.abs(b), sizes, group), np.where(bounded > 0, bounded, np.inf))
+    for b in constants:
+        sizes = _spread(abs(J).tocsr(), b, sizes, group)
+    sizes = np.minimum(sizes, np.where(bounded > 0, bounded, np.inf))
     sizes = np.where(sizes > 0, np.maximum(sizes, _largest_of_group(np.abs(start), group)), 0.0)
     return np.where(given != 1.0, given, _factors(sizes, MILD_SIZES))
 

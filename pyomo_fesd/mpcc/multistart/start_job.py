@@ -82,7 +82,9 @@ class Job:
         began, compiled = time.perf_counter(), self._setup.compiled
         compiled.x0 = x0
         options, after = self._cold if number else self._options, partial(self._setup.after, start=number)
-        run = HybridSolver(replace(self._setup, options=options, show=lambda entry: None, after=after)).solve()
+        setup = replace(self._setup, options=options, show=lambda entry: None, after=after)
+        # a further start is one for the model's own values
+        run = HybridSolver(replace(setup, further_start=None) if number else setup).solve()
         run.steps = [replace(step, w=None) for step in run.steps]
         certified = run.point is not None and run.point.certificate.certified
         spent = run.counts.nlps, run.counts.iterations, time.perf_counter() - began

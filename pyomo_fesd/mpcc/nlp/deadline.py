@@ -24,6 +24,11 @@ class Deadline:
         """The deadline this many seconds from now; none for None."""
         return cls(None if seconds is None else time.perf_counter() + seconds)
 
+    def part(self, share: float) -> 'Deadline':
+        """The deadline after a share of the seconds left; none without one."""
+        left = self.left()
+        return Deadline.after(None if left is None else share * left)
+
     def left(self) -> float | None:
         """Seconds left, not below 0; None without a deadline."""
         return None if self.at is None else max(0.0, self.at - time.perf_counter())

@@ -39,6 +39,8 @@ SOLVED = (
     'Converged with feasible KKT point',
     'optimal',
 )
+#: Status of a run that a limit of iterations or time has stopped.
+STOPPED = ('User_Requested_Stop', 'Maximum_Iterations_Exceeded', 'iteration or time limit', 'maxIterations')
 #: A row without variables may miss its bounds by this much.
 ROW_TOLERANCE = 1e-8
 #: ``nlp_solver`` -> module, class, how to install it; every other name is an executable.
@@ -77,6 +79,11 @@ class NlpResult:
     def solved(self):
         """Whether the solver reports a stationary, feasible point."""
         return self.status in SOLVED
+
+    @property
+    def stopped(self):
+        """Whether a limit has stopped the solver on its way."""
+        return self.status in STOPPED
 
     def shortened(self, n):
         """The same result with the first ``n`` variables' values."""

@@ -1,5 +1,8 @@
 """Pyomo's results of a run: conditions, objective, a loader for values and multipliers, and the results of this solver only."""
 
+from functools import partial
+from operator import attrgetter
+
 import numpy as np
 from pyomo.common.collections import ComponentMap
 from pyomo.contrib.solver.common.results import SolutionStatus, TerminationCondition
@@ -21,13 +24,15 @@ CONDITIONS = {
     Outcome.INTERRUPTED: (TerminationCondition.interrupted, SolutionStatus.unknown),
     Outcome.STOPPED: (TerminationCondition.interrupted, SolutionStatus.unknown),
 }
+#: Outcomes whose least infeasible point shows what is wrong, unless there is a feasible one.
+WITHOUT_POINT = (Outcome.INFEASIBLE, Outcome.TIME_LIMIT, Outcome.ITERATION_LIMIT)
 #: Measures of a certificate, None without one.
 MEASURES = ('violation', 'complementarity', 'violation_scaled', 'complementarity_scaled')
 #: Number of violated pairs and rows that a report names.
 NAMED = 5
 
 
-def fill_results(results, model, run, loaded, compiled=None, reason=''):
+def fill_results(results, model, run, loaded, compiled=None, reason='', names=lambda *_: attrgetter('name')):
     """Fill Pyomo's ``results`` from a ``Run``.
 
     Parameters
@@ -38,6 +43,8 @@ def fill_results(results, model, run, loaded, compiled=None, reason=''):
         None if the model could not be compiled
     reason : str
         the cause, in that case
+    names : callable (model, variables, values) -> callable component -> str
+        names of rows and pairs at a point
     """
     condition, status = CONDITIONS[run.outcome]
     results.termination_condition = condition
@@ -54,7 +61,7 @@ def fill_results(results, model, run, loaded, compiled=None, reason=''):
         if run.point is not None and compiled.has_objective:
             results.incumbent_objective = compiled.objective(run.point.f)
     _fill_certificate(info, certificate)
-    info.violated = _violated(compiled, run)
+    info.violated = _violated(compiled, run, partial(names, model))
     if info.violated:
         reason = 'largest violations: ' + ', '.join(f'{name} ({amount:.1e})' for name, amount in info.violated)
     info.reason = reason or info.reason
@@ -76,15 +83,21 @@ def _status_of(run):
     return SolutionStatus.feasible if run.point.certificate.feasible else SolutionStatus.infeasible
 
 
-def _violated(c, run):
-    """The most violated rows and pairs of an infeasible problem, by name."""
-    if run.outcome is not Outcome.INFEASIBLE or run.w is None:
+def _violated(c, run, names):
+    """The most violated rows and pairs of a run that found no feasible point, by name."""
+    if run.outcome not in WITHOUT_POINT or run.point is not None or run.w is None:
         return []
     at = c.evaluate(run.w)
     rows, _ = c.violations(run.w, at)
     amounts = [*rows, *np.abs(np.minimum(at.G, at.H))]
-    named = [(component.name, float(amount)) for component, amount in zip([*c.constraints, *c.conditions], amounts)]
-    return [(name, amount) for name, amount in sorted(named, key=lambda item: -item[1])[:NAMED] if amount > 0]
+    components = [*c.constraints, *(condition.source for condition in c.conditions)]
+    largest = sorted(zip(components, map(float, amounts)), key=lambda item: -item[1])
+    name, found = names(c.variables, c.values(run.w)), {}
+    for component, amount in largest:
+        # pairs of one source may share a name
+        if amount > 0 and len(found) < NAMED:
+            found.setdefault(name(component), amount)
+    return list(found.items())
 
 
 class Loader(SolutionLoader):

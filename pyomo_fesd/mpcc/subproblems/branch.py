@@ -49,7 +49,7 @@ class Branch:
         self._values = ca.Function('rows', [c.x, c.p], [nlp.g])
         self._nlp = make('branch', nlp.x, ca.vertcat(weight, c.p), nlp.f, nlp.g, NEAR, nlp.derivatives)
 
-    def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None):
+    def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None, settled=ROW_TOLERANCE):
         """Solve the branch ``zero`` from ``w``.
 
         Parameters
@@ -65,6 +65,8 @@ class Branch:
         duals : NlpResult, optional
             a relaxation's or branch's result whose multipliers to start from
         max_iter : int, optional
+        settled : float
+            violation of rows without free variables that is accepted
 
         Returns
         -------
@@ -78,7 +80,7 @@ class Branch:
         lbx, ubx = bounds
         lbg, ubg = self._row_bounds(zero, equal)
         w = np.clip(w, lbx, ubx)
-        if not self._drop_settled_rows(w, lbx == ubx, lbg, ubg):
+        if not self._drop_settled_rows(w, lbx == ubx, lbg, ubg, settled):
             return None
         self._widen_surplus_equations(lbx == ubx, lbg, ubg)
         if box is not None:
@@ -120,12 +122,12 @@ class Branch:
         lbg = np.concatenate([c.lbg, np.zeros(len(upper)), -free])
         return lbg, np.concatenate([c.ubg, upper, free])
 
-    def _drop_settled_rows(self, w, fixed, lbg, ubg):
-        """Free the rows whose variables are all fixed; returns False if one of them is violated."""
+    def _drop_settled_rows(self, w, fixed, lbg, ubg, most):
+        """Free the rows whose variables are all fixed; returns False if one of them is violated by more than ``most``."""
         settled = (self._pattern @ (~fixed).astype(float)) == 0
         if settled.any():
             g = np.asarray(self._values(w, self._c.parameters), dtype=float).ravel()[settled]
-            if np.any(g < lbg[settled] - ROW_TOLERANCE) or np.any(g > ubg[settled] + ROW_TOLERANCE):
+            if np.any(g < lbg[settled] - most) or np.any(g > ubg[settled] + most):
                 return False
             lbg[settled], ubg[settled] = -np.inf, np.inf
         return True

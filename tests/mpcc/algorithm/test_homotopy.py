@@ -10,6 +10,7 @@ from pyomo.contrib.solver.common.results import SolutionStatus, TerminationCondi
 from pyomo.contrib.solver.common.util import NoOptimalSolutionError
 from pyomo.mpec import Complementarity, complements
 
+from pyomo_fesd.core import homotopy_hints
 from pyomo_fesd.mpcc.algorithm.recovery import RECOVERIES
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS
 
@@ -82,6 +83,28 @@ def test_a_failed_relaxation_is_followed_by_the_recoveries_in_their_order():
     assert eps[2] == pytest.approx(eps[1] / np.sqrt(0.1))
     assert max(eps) == 100
     assert notes[len(RECOVERIES) : len(RECOVERIES) + 2] == ['search over the pairs', 'start elsewhere']
+
+
+def test_a_relaxation_that_its_budget_stops_goes_on_once_from_where_it_is():
+    results = run(small_mpccs.bard1()[0], relaxation_iterations=4)
+    first, note, second = results.extra_info.steps[:3]
+    assert (first.iterations, note.status, second.eps) == (4, 'go on', first.eps)
+    assert np.array_equal(note.w, first.w)
+    notes = [step.status for step in results.extra_info.steps if step.kind == 'recovery']
+    assert all(after != 'go on' for before, after in zip(notes, notes[1:]) if before == 'go on')
+    assert results.extra_info.stationarity == 'B'
+
+
+def test_a_point_that_only_guide_bounds_hold_goes_on_without_them():
+    m = small_mpccs.pair(0.5, 0.5)
+    m.h = pyo.Var(bounds=(0, None), initialize=1)
+    m.f = pyo.Objective(expr=(m.x - 1) ** 2 + (m.h - 0.2) ** 2)
+    homotopy_hints(m).guide_bounds[m.h] = (0.5, 2)
+    results = run(m)
+    steps = results.extra_info.steps
+    assert results.extra_info.stationarity == 'B' and pyo.value(m.h) == pytest.approx(0.2)
+    assert [s.status for s in steps if s.kind == 'certificate'][:2] == ['LIMITED', 'B']
+    assert not any('wider bounds' in s.status for s in steps)
 
 
 @pytest.mark.parametrize('build', [small_mpccs.bard1, mpcc_collection.no_objective])

@@ -64,8 +64,6 @@ CASES = [*(('simulate', b) for b in (signum, tank, relay)), ('mpec_hybrid', sign
 @pytest.mark.parametrize('solver, build', CASES, ids=lambda c: getattr(c, '__name__', c))
 @pytest.mark.parametrize('T, X', [*((T, 1.0) for T in SCALES), *((1.0, X) for X in SCALES if X != 1), (1e-9, 1e9), (1e9, 1e-9)])
 def test_switches_are_the_same_in_all_units(build, T, X, solver):
-    if (solver, build, T, X) == ('simulate', tank, 1e9, 1e-9):
-        pytest.xfail("the small problem of a switch stops at its tolerance; states of size 1 or a scaling_factor help")
     m, exact = build(T, X)
     SOLVERS[solver](m)
     assert [s.time / T for s in pyomo_fesd.switches(m)] == pytest.approx(exact, abs=1e-7)
@@ -98,7 +96,7 @@ def factors(J, b, start, given=None, alike=()):
     n = len(start)
     bounds = np.full(n, -np.inf), np.full(n, np.inf)
     given = np.ones(n) if given is None else np.array(given)
-    return variable_factors(sparse.csr_matrix(J), np.array(b), np.array(start, dtype=float), bounds, given, list(alike))
+    return variable_factors(sparse.csr_matrix(J), [np.array(b)], np.array(start, dtype=float), bounds, given, list(alike))
 
 
 def test_mild_problems_are_left_alone():
