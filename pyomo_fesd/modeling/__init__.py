@@ -10,6 +10,8 @@ state_jump.py, projection.py
     jumps of states, states confined to a set
 contact.py, friction.py
     rigid bodies that touch, dry friction of any force law
+rules.py
+    checks of the rules of these Blocks
 """
 
 from pyomo_fesd.modeling.clock import clock

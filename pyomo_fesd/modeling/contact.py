@@ -13,6 +13,7 @@ from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import Contact, FesdError, switched_systems
 from pyomo_fesd.modeling.friction import add_friction
+from pyomo_fesd.modeling.rules import refuse_wrong_rules, whole_or_none
 
 
 def contact(*sets, gap, restitution=0, friction=None, slip=None, directions: int = 8) -> Block:
@@ -58,11 +59,12 @@ def contact(*sets, gap, restitution=0, friction=None, slip=None, directions: int
     Source: Nurkanovic, Frey, Pozharskiy, Diehl (2024), FESD-J.
     """
 
+    refuse_wrong_rules('contact', sets, gap=gap, **({} if slip is None else {'slip': slip}))
     if (friction is None) != (slip is None):
         raise FesdError('contact', "friction and slip belong together, and one of them was not given", "give both, or none")
     time = next((s for s in sets if getattr(s, 'ctype', None) is ContinuousSet), None)
 
-    def rule(block, *index):
+    def fill(block, *index):
         parent = block.parent_block()
         block.gap = Expression(expr=_gap(block, gap(parent, *index)))
         block.normal = Var(bounds=(0, None), initialize=0)
@@ -73,7 +75,7 @@ def contact(*sets, gap, restitution=0, friction=None, slip=None, directions: int
             mu = _coefficient(block, _given(friction, parent, index))
             add_friction(block, 'friction', slip(parent, *index), mu * block.normal, directions, time)
 
-    return Block(*sets, rule=rule)
+    return Block(*sets, rule=whole_or_none(fill))
 
 
 def _given(given, parent, index):

@@ -30,6 +30,7 @@ from pyomo_fesd.core import (
     public_name,
     switched_systems,
 )
+from pyomo_fesd.modeling.rules import refuse_wrong_rules, whole_or_none
 
 #: The sides of dry friction in the plane, as reports name them.
 FORWARD, BACKWARD, STICKS = 'slips forward', 'slips backward', 'sticks'
@@ -60,19 +61,20 @@ def friction(*sets, velocity, limit, directions: int = 8) -> Block:
     A block on a table: ``m.rub = friction(m.t, velocity=lambda m, t: m.v[t], limit=lambda m, t: mu * mass * g)`` and
     ``mass * m.dv[t] == m.push[t] + m.rub[t].force``
     """
+    refuse_wrong_rules('friction', sets, velocity=velocity, limit=limit)
     _check_directions(directions)
     time = next((s for s in sets if getattr(s, 'ctype', None) is ContinuousSet), None)
 
-    def rule(block, *index):
+    def fill(block, *index):
         parent = block.parent_block()
         add_friction(block, 'force', velocity(parent, *index), limit(parent, *index), directions, time)
 
-    return Block(*sets, rule=rule)
+    return Block(*sets, rule=whole_or_none(fill))
 
 
 def _check_directions(directions):
-    if directions < 4:
-        raise FesdError('friction', f"directions={directions}", "give at least 4, so that forces of all directions exist")
+    if isinstance(directions, bool) or not isinstance(directions, int) or directions < 4:
+        raise FesdError('friction', f"directions={directions!r}", "give at least 4, so that forces of all directions exist")
 
 
 def add_friction(block: BlockData, name: str, velocity, limit, directions: int, time: ContinuousSet | None) -> None:
