@@ -9,11 +9,9 @@ Applies always; for two modes the Heaviside form is smaller.
 
 from collections.abc import Iterable
 
-from pyomo.core import Constraint, RangeSet, Var
 from pyomo.core.base.block import BlockData
-from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import switched_systems, value_or_zero
+from pyomo_fesd.core import add_smallest, declare_smallest
 from pyomo_fesd.dcs.reading import ModeSystem
 
 NAME = 'stewart'
@@ -41,43 +39,17 @@ def _modes_of_regions(system):
 
 def declare(block: BlockData, sets: tuple, regions: int) -> None:
     """Declare the components of the form over ``sets`` for a number of ``regions``."""
-    block.regions = RangeSet(regions)
-    block.nu = Var(*sets, block.regions, dense=False, bounds=(0, 1))
-    block.lam = Var(*sets, block.regions, dense=False, bounds=(0, None))
-    block.mu = Var(*sets, **({'dense': False} if sets else {}))
-    block.stationarity = Constraint(*sets, block.regions)
-    block.simplex = Constraint(*sets)
-    block.complementarity = Complementarity(*sets, block.regions)
-    for variable in (block.lam, block.mu):
-        switched_systems(block).continuous[variable] = block.stationarity
+    declare_smallest(block, sets, regions)
 
 
 def add(block: BlockData, index: tuple, system: ModeSystem) -> None:
     """Add one time of one Disjunction."""
     patterns = [pattern for owned in system.regions.geometry.patterns for pattern in owned]
-    minimise(
+    add_smallest(
         block,
         index,
         [sum(-c if sign > 0 else c for sign, c in zip(pattern, system.regions.functions)) for pattern in patterns],
     )
-
-
-def minimise(block: BlockData, index: tuple, g: list) -> list:
-    """Add the linear program whose solution nu weights the smallest of the functions g_i; return nu."""
-    nu = [block.nu[(*index, i)] for i in block.regions]
-    lam = [block.lam[(*index, i)] for i in block.regions]
-    mu = block.mu[index or None]
-    now = [value_or_zero(g_i) for g_i in g]
-    mu.value = min(now)
-    for i, g_i in enumerate(g):
-        nu[i].value, lam[i].value = 1 / len(g), now[i] - mu.value
-        block.stationarity.add((*index, i + 1), g_i - lam[i] - mu == 0)
-        block.complementarity.add((*index, i + 1), complements(nu[i] >= 0, lam[i] >= 0))
-        if i:
-            # all but one: the last follows from the simplex
-            switched_systems(block).selectors.add(nu[i])
-    block.simplex.add(index or None, sum(nu) == 1)
-    return nu
 
 
 def weight(block: BlockData, index: tuple, system: ModeSystem, modes):
