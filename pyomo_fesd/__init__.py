@@ -12,7 +12,19 @@ from pyomo_fesd import smoothing as _smoothing  # noqa: F401
 from pyomo_fesd import units
 from pyomo_fesd.analysis import report, structure
 from pyomo_fesd.core import FesdError, __version__
-from pyomo_fesd.modeling import absolute, clip, clock, maximum, minimum, positive_part, projection, signal, state_jump
+from pyomo_fesd.modeling import (
+    absolute,
+    clip,
+    clock,
+    contact,
+    friction,
+    maximum,
+    minimum,
+    positive_part,
+    projection,
+    signal,
+    state_jump,
+)
 from pyomo_fesd.refinement import refine
 from pyomo_fesd.results import element_lengths, physical_time, plot, switches, trajectory
 from pyomo_fesd.simulation import simulate
@@ -25,7 +37,9 @@ __all__ = [
     'certify',
     'clip',
     'clock',
+    'contact',
     'element_lengths',
+    'friction',
     'maximum',
     'minimum',
     'physical_time',

@@ -7,10 +7,11 @@ by ``fesd.finite_elements``) and ``homotopy_hints`` (for the solver; no time in 
 versions, ``rollback`` undoes what was left half
 done, ``interruption`` lets Ctrl-C wait where something would be, ``withheld_messages`` keeps back the messages of one thread,
 ``turns`` lets threads wait for one another.  ``evaluation``, ``gradient``, ``interpolation``, ``positive_part``,
+``step``, ``smallest``,
 ``expression_key`` and ``phase`` are tools.  This room imports from no other.
 """
 
-from pyomo_fesd.core.boundary_laws import Hysteresis, StateJumps
+from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
 from pyomo_fesd.core.complementarity import Mixed, Pair, distance_to_bound, read_complementarity, read_side
 from pyomo_fesd.core.errors import FesdError
 from pyomo_fesd.core.evaluation import kept_values, known_sign, mutable_parameters, value_or_nan, value_or_zero
@@ -50,7 +51,10 @@ from pyomo_fesd.core.positive_part import add_positive_part, declare_positive_pa
 from pyomo_fesd.core.private_data import records_below, remember_records
 from pyomo_fesd.core.renamed import Renamed
 from pyomo_fesd.core.rollback import restored_on_error
+from pyomo_fesd.core.smallest import add_smallest, declare_smallest
+from pyomo_fesd.core.step import add_step, declare_step
 from pyomo_fesd.core.switched_systems import (
+    Contact,
     Dependents,
     HysteresisMode,
     Reset,

@@ -120,6 +120,8 @@ class MovingGrid(AutoSlots.Mixin):
             yield from (self.hysteresis.parts, self.hysteresis.region, self.hysteresis.least, self.hysteresis.leaving)
         if self.state_jumps is not None:
             yield from (self.state_jumps.happens, self.state_jumps.binary)
+            if self.state_jumps.impacts is not None:
+                yield from (self.state_jumps.impacts.impact, self.state_jumps.impacts.slip)
 
     def element_length(self, element: Element):
         """Return h_n as an expression, in labels of the ContinuousSet."""

@@ -65,6 +65,31 @@ class Reset:
 
 
 @dataclass(frozen=True)
+class Contact:
+    """One rigid contact at one time.
+
+    Attributes
+    ----------
+    block : BlockData
+        the block that ``contact`` made
+    gap : ExpressionData
+        the distance, never negative
+    normal : VarData
+        the contact force, 0 <= normal perp gap >= 0
+    touching : ComplementarityData
+        this condition
+    restitution : number or expression
+        e, the part of the normal velocity that an impact returns
+    """
+
+    block: Any
+    gap: Any
+    normal: Any
+    touching: Any
+    restitution: Any
+
+
+@dataclass(frozen=True)
 class Step:
     """One step function at one time (eq. 5).
 
@@ -159,6 +184,7 @@ class SwitchedSystems(AutoSlots.Mixin):
     surfaces : list of Surface
     hysteresis : list of HysteresisMode
     resets : list of Reset
+    contacts : list of Contact
     writers : list of TimeWriter
         applications of transformations
     waiting : list of TimeWriter
@@ -179,6 +205,7 @@ class SwitchedSystems(AutoSlots.Mixin):
         'surfaces',
         'hysteresis',
         'resets',
+        'contacts',
         'writers',
         'waiting',
         'signals',
@@ -188,7 +215,8 @@ class SwitchedSystems(AutoSlots.Mixin):
     def __init__(self):
         self.continuous, self.multipliers = ComponentMap(), ComponentMap()
         self.selectors, self.excluded, self.signals = ComponentSet(), ComponentSet(), ComponentSet()
-        self.steps, self.dependents, self.surfaces, self.hysteresis, self.resets = [], [], [], [], []
+        self.steps, self.dependents, self.surfaces = [], [], []
+        self.hysteresis, self.resets, self.contacts = [], [], []
         self.writers, self.waiting, self.breakpoints = [], [], []
 
     def include(self, other: 'SwitchedSystems') -> 'SwitchedSystems':

@@ -73,6 +73,10 @@ def switching_together(moving: MovingGrid) -> dict[str, str]:
         families[mode.name] = mode.system
     for law in [] if moving.state_jumps is None else moving.state_jumps.laws:
         families[law.name] = law.name
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    names = {id(condition): c.name for c in moving.complementarities for condition in c.conditions.values()}
+    for law in [] if impacts is None else impacts.laws:
+        families[law.name] = families[names[id(next(iter(law.touching.values())))]]
     return families
 
 

@@ -18,6 +18,7 @@ from pyomo.core import Block, Constraint, Expression, quicksum
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import BranchConstraint, MovingGrid, Penalty, homotopy_hints
+from pyomo_fesd.finite_elements.contacts import impulse_activity
 from pyomo_fesd.finite_elements.state_jumps import no_jump
 
 #: Keeps the activity defined where both sums vanish (a grazing contact); far below any relevant nu or lam.
@@ -80,4 +81,17 @@ def _unchanged(moving, independent, e, f):
     both = [(a, b) for a, b in pairs if a.expr is not None and b.expr is not None]
     if moving.hysteresis is not None:
         both += [(mode.weight(e), mode.weight(f)) for mode in moving.hysteresis.modes if mode.independent]
-    return [*(a * b + (1 - a) * (1 - b) for a, b in both), *no_jump(moving.state_jumps, e)]
+    unchanged = [a * b + (1 - a) * (1 - b) for a, b in both]
+    return [*unchanged, *no_jump(moving.state_jumps, e), *_no_impact(moving, e, f)]
+
+
+def _no_impact(moving, e, f):
+    """Factors that are 0 where a contact opens again after an impact; one that stays closed, or closes, counts by its force."""
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    if impacts is None:
+        return
+    names = {id(condition): c.name for c in moving.complementarities for condition in c.conditions.values()}
+    for law in impacts.laws:
+        name = names[id(law.touching[f.left])]
+        closed = moving.activity[name, e.n] * moving.activity[name, f.n]
+        yield 1 - impulse_activity(impacts, law, e.n, law.gaps[f.left], TINY) * (1 - closed)

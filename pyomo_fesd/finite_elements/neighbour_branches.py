@@ -50,7 +50,7 @@ class PairsByPlace:
     def __init__(self, moving: MovingGrid):
         self._of_elements = _by_number(moving.pairs_of_elements())
         self._of_boundaries = _by_number(moving.pairs_of_boundaries())
-        self._of_jumps = _by_number([] if moving.state_jumps is None else [moving.state_jumps.binary])
+        self._of_jumps = _by_number(_pairs_of_jumps(moving.state_jumps))
 
     def moved(self, before: Element, step: int) -> list[tuple]:
         """Return the pairs that change if all switches at the boundary after ``before`` move by one element, with their sources.
@@ -84,6 +84,12 @@ class PairsByPlace:
         n = before.n
         jumps = [pair for pair in _matching(self._of_jumps, n, n - 1) if pair[1] is not None]
         return [*_matching(self._of_elements, n + 1, n), *(jumps or _matching(self._of_jumps, n, n + 1))]
+
+
+def _pairs_of_jumps(jumps):
+    if jumps is None:
+        return []
+    return [jumps.binary, *([] if jumps.impacts is None else [jumps.impacts.impact])]
 
 
 def _by_number(components) -> list[dict]:

@@ -32,6 +32,7 @@ from pyomo_fesd.core import (
     is_discretisation_equation,
     strip_time,
 )
+from pyomo_fesd.finite_elements.contacts import ContactLaw, declare_impacts, stabilise, write_impacts
 
 
 @dataclass(frozen=True)
@@ -91,14 +92,15 @@ def check_guards(laws: list[JumpLaw], controls: list) -> None:
                 )
 
 
-def add_state_jumps(moving: MovingGrid, laws: list[JumpLaw]) -> None:
-    """Add the state jumps at the inner boundaries, and let elements start after them."""
-    if not laws:
+def add_state_jumps(moving: MovingGrid, laws: list[JumpLaw], contacts: list[ContactLaw]) -> None:
+    """Add the state jumps and the impacts at the inner boundaries, and let elements start after them."""
+    if not laws and not contacts:
         return
     inner = {e.n: e.right for e in moving.grid.elements[:-1]}
     moving.block.jumps = block = Block()
     _declare_jump_pairs(block, laws, inner)
-    moving.state_jumps = StateJumps(laws, block, block.e, block.happens, block.binary, block.after, block.copy, block.copied)
+    kept = (block.e, block.happens, block.binary, block.after, block.copy, block.copied)
+    moving.state_jumps = StateJumps(laws, block, *kept, declare_impacts(moving, contacts, block))
     for law in laws:
         for b, label in inner.items():
             e = block.e[law.name, b]
@@ -107,7 +109,10 @@ def add_state_jumps(moving: MovingGrid, laws: list[JumpLaw]) -> None:
         # the pairs keep the guard's sign at the inner boundaries
         for label in law.guards.keys() - inner.values():
             block.guarded.add(law.guards[label] >= 0)
+    _add_after(moving)
+    write_impacts(moving)
     _start_after(moving)
+    stabilise(moving)
 
 
 def _declare_jump_pairs(block, laws, inner):
@@ -124,14 +129,19 @@ def _declare_jump_pairs(block, laws, inner):
     block.copied = Constraint(block.boundary, block.place)
 
 
+def _add_after(moving):
+    """The values of reset states after each inner boundary."""
+    jumps = moving.state_jumps
+    for element in moving.grid.elements[:-1]:
+        for j, (x, laws) in enumerate(jumps.jumping(element.right).items(), start=1):
+            jumps.block.number.add(j)
+            jumps.after[element.n, j] = x + quicksum(jumps.e[name, element.n] * (J - x) for name, J in laws)
+
+
 def _start_after(moving):
     """Elements start from the values after the boundary on their left."""
     jumps, times, owner, starts = moving.state_jumps, TimeIndex(moving.wrt), moving.grid.element_of(), {}
     for element in moving.grid.elements[:-1]:
-        states = jumps.jumping(element.right)
-        for j, (x, laws) in enumerate(states.items(), start=1):
-            jumps.block.number.add(j)
-            jumps.after[element.n, j] = x + quicksum(jumps.e[name, element.n] * (J - x) for name, J in laws)
         starts[element.n + 1] = {id(x): after for x, after in jumps.values_after(element).items()}
     for equation in filter(is_discretisation_equation, _active_constraints(jumps.block.model())):
         label = times.time(equation)
@@ -145,5 +155,5 @@ def _active_constraints(model):
 
 
 def no_jump(state_jumps: StateJumps | None, before) -> list:
-    """Return the factors of eta (eq. 12) at the boundary after element ``before``: 0 where a state jumps."""
+    """Return the factors of eta (eq. 12) at the boundary after element ``before``: 0 where a state is reset."""
     return [] if state_jumps is None else [1 - state_jumps.e[law.name, before.n] for law in state_jumps.laws]

@@ -53,6 +53,8 @@ class TimeComplementarity:
         both sides are functions of multipliers that jump: it switches only where the conditions of these do
     starts : dict element number -> Pair
         the sides after the left boundary of an element, where a state jumps there
+    departures : dict element number -> VarData
+        of a contact force: a further term of the second side at the left boundary of an element (eq. 21)
     has_right_limits : bool
         its argument jumps with the modes or with controls; ``starts`` holds its sides after these boundaries
     """
@@ -65,6 +67,7 @@ class TimeComplementarity:
     swapped: bool = False
     follows: bool = False
     starts: dict = field(default_factory=dict)
+    departures: dict = field(default_factory=dict)
     has_right_limits: bool = False
 
     def points(self, element: Element) -> list[float]:
@@ -80,6 +83,8 @@ class TimeComplementarity:
             values.append(self.starts.get(element.n, self.sides[element.left])[side])
         if element.right not in element.points and element.right in self.sides:
             values.append(self.sides[element.right][side])
+        if side == 1 and element.n in self.departures:
+            values.append(self.departures[element.n])
         return values
 
 

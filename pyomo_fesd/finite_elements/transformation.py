@@ -32,6 +32,7 @@ from pyomo_fesd.core import (
 )
 from pyomo_fesd.finite_elements.arrivals import add_arrivals
 from pyomo_fesd.finite_elements.coincidences import add_coincidences
+from pyomo_fesd.finite_elements.contacts import add_friction_impulses, read_contacts, with_departures
 from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
 from pyomo_fesd.finite_elements.controls import check_controls, fix_given, hold_controls
 from pyomo_fesd.finite_elements.cross_complementarity import add_cross_complementarity
@@ -63,12 +64,13 @@ from pyomo_fesd.finite_elements.untaken_kinks import warn_untaken_kinks
 
 @dataclass
 class _Switching:
-    """All that switches over time: pairs and mixed conditions (name -> {time: data}), modes with hysteresis, state jumps."""
+    """All that switches over time: pairs and mixed conditions (name -> {time: data}), and laws of modes, jumps and contacts."""
 
     pairs: dict
     mixed: dict
     modes: list
     jumps: list
+    contacts: list
 
     def __bool__(self):
         return bool(self.pairs or self.mixed or self.modes or self.jumps)
@@ -201,7 +203,7 @@ def _rebuild_integrals(instance, moving):
 def _read_switching(instance, wrt, config):
     pairs, mixed = conditions_over_time(instance, TimeIndex(wrt))
     model = instance.model()
-    switching = _Switching(pairs, mixed, read_hysteresis(model, wrt), read_jumps(model, wrt))
+    switching = _Switching(pairs, mixed, read_hysteresis(model, wrt), read_jumps(model, wrt), read_contacts(model, wrt))
     check_guards(switching.jumps, _held(config, wrt))
     if not switching:
         _refuse_disjunctions(instance, TimeIndex(wrt))
@@ -257,12 +259,14 @@ def _relate_sizes(moving):
 
 def _add_switching(moving, switching, complementarities, continuity, config):
     """Write the pairs of all that switches, and the conditions on the lengths."""
-    add_state_jumps(moving, switching.jumps)
+    add_state_jumps(moving, switching.jumps, switching.contacts)
     limits = RightLimits(moving, continuity, [*_held(config, moving.wrt), *config.continuous])
     complementarities = list(map(limits.with_starts, complementarities))
     add_hysteresis(moving, switching.modes, limits)
     complementarities = with_mode_limits(moving, complementarities, continuity, config.piecewise_constant)
     warn_unknown(moving, complementarities)
+    add_friction_impulses(moving, complementarities)
+    complementarities = with_departures(moving, complementarities)
     add_cross_complementarity(moving, complementarities, config.cross_complementarity)
     if not switching:
         moving.r.fix(1)

@@ -7,10 +7,16 @@ clock.py
 signal.py, on time_series.py
     time series as inputs
 state_jump.py, projection.py
-    jumps of states and states confined to a set
+    jumps of states, states confined to a set
+contact.py, friction.py
+    rigid bodies that touch, dry friction of any force law
+rules.py
+    checks of the rules of these Blocks
 """
 
 from pyomo_fesd.modeling.clock import clock
+from pyomo_fesd.modeling.contact import contact
+from pyomo_fesd.modeling.friction import friction
 from pyomo_fesd.modeling.nonsmooth_functions import absolute, clip, maximum, minimum, positive_part
 from pyomo_fesd.modeling.projection import projection
 from pyomo_fesd.modeling.signal import signal

@@ -1,6 +1,5 @@
 """State jumps: a guard and the states after the jump, written in the model."""
 
-from collections.abc import Collection
 from math import isfinite
 from numbers import Real
 
@@ -8,6 +7,7 @@ from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Expression
 
 from pyomo_fesd.core import GENERATED, FesdError, Reset, switched_systems
+from pyomo_fesd.modeling.rules import refuse_wrong_rules, whole_or_none
 
 
 def state_jump(*sets, guard, reset) -> Block:
@@ -37,20 +37,7 @@ def state_jump(*sets, guard, reset) -> Block:
     Source: Nurkanovic, Frey, Pozharskiy, Diehl (2023), FESD-J.
     """
 
-    for name, given in (('guard', guard), ('reset', reset)):
-        if not callable(given):
-            raise FesdError('state_jump', f"{name}={given!r} is not a function", f"give {name}=lambda m, t: ...")
-    for given in sets:
-        if isinstance(given, str) or not isinstance(given, Collection):
-            raise FesdError('state_jump', f"{given!r} is not a Set", "give the ContinuousSet, and other Sets of the model")
-
-    def rule(block, *index):
-        try:
-            fill(block, *index)
-        except FesdError:
-            # a Block with a part of its data is no component that a user could repair
-            block.parent_block().del_component(block.parent_component())
-            raise
+    refuse_wrong_rules('state_jump', sets, guard=guard, reset=reset)
 
     def fill(block, *index):
         parent = block.parent_block()
@@ -63,7 +50,7 @@ def state_jump(*sets, guard, reset) -> Block:
         states = tuple((state, values[j]) for j, (state, _) in enumerate(resets, start=1))
         switched_systems(block).resets.append(Reset(block, block.guard, states))
 
-    return Block(*sets, rule=rule)
+    return Block(*sets, rule=whole_or_none(fill))
 
 
 def _guard(block, given):

@@ -5,17 +5,29 @@ A mode of a pair is named by the side that is positive, of a condition with two 
 
 from collections.abc import Iterable
 
-from pyomo.common.collections import ComponentSet
+from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block
 from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import Element, Pair, TimeIndex, is_generated, moving_grids, read_complementarity, strip_time, value_or_nan
+from pyomo_fesd.core import (
+    Element,
+    Pair,
+    TimeIndex,
+    all_switched_systems,
+    is_generated,
+    moving_grids,
+    read_complementarity,
+    strip_time,
+    value_or_nan,
+)
 
 #: A multiplier nearer than this to 0 (or to 1) counts as off (or on).
 CLEAR = 1e-6
 #: The modes of a condition with two bounds on one side.
 AT_LOWER, BETWEEN, AT_UPPER = 'at lower bound', 'between', 'at upper bound'
+#: The modes of a rigid contact.
+OPEN, CLOSED = 'open', 'closed'
 
 
 def complementarity_modes(model: Block, wrt: ContinuousSet, times: TimeIndex) -> dict:
@@ -23,6 +35,7 @@ def complementarity_modes(model: Block, wrt: ContinuousSet, times: TimeIndex) ->
 
     Those that ``fesd.finite_elements`` has aggregated are inactive except at the first time; others that are inactive are left out.
     """
+    contacts = ComponentMap((contact.touching, contact) for contact in all_switched_systems(model).contacts)
     own = (c for c in model.component_data_objects(Complementarity, descend_into=Block) if not is_generated(c))
     moving, found = moving_grids(model).get(wrt), {}
     splits = {} if moving is None else moving.splits
@@ -30,8 +43,18 @@ def complementarity_modes(model: Block, wrt: ContinuousSet, times: TimeIndex) ->
     for name, by_time in times.families(own).items():
         if any(c.active or c in summed for c in by_time.values()):
             present = {t: c for t, c in by_time.items() if moving is not None or c.active}
-            found[strip_time(name)] = _by_mode(present, splits)
+            touching = contacts.get(next(iter(present.values())))
+            if touching is None:
+                found[strip_time(name)] = _by_mode(present, splits)
+            else:
+                name = times.split(touching.block)[1]
+                found[strip_time(name)] = _of_contact([contacts[c] for c in present.values()], times)
     return found
+
+
+def _of_contact(contacts, times):
+    at = {times.time(contact.block): contact for contact in contacts}
+    return {OPEN: {t: c.gap for t, c in at.items()}, CLOSED: {t: c.normal for t, c in at.items()}}
 
 
 def _by_mode(by_time, splits):

@@ -7,6 +7,7 @@ from pyomo_fesd.simulation.determinacy import refuse_undetermined, refuse_undete
 from pyomo_fesd.simulation.element_class import ElementClass, ElementEnd
 from pyomo_fesd.simulation.equation_reader import EquationReader
 from pyomo_fesd.simulation.events import JumpEvents, read_hysteresis
+from pyomo_fesd.simulation.impacts import ImpactEvents
 from pyomo_fesd.simulation.inputs import given_variables
 from pyomo_fesd.simulation.largest_residuals import largest_residuals
 from pyomo_fesd.simulation.progress import Progress
@@ -35,6 +36,7 @@ class ElementSolver:
         self._moving = moving_grids(model)[wrt]
         self._grid, self._hysteresis = self._moving.grid, read_hysteresis(self._moving)
         self._jumps = JumpEvents(self._moving.state_jumps)
+        self._impacts = ImpactEvents(self._moving.state_jumps, self._times, self._solve_impact)
         given = given_variables(model, self._times, inputs, self._moving.held)
         given.update(v for some in self._hysteresis for e in self._grid.elements for v in some.variables(e.right))
         self._reader = EquationReader(model, self._moving, self._times, given)
@@ -68,6 +70,7 @@ class ElementSolver:
     def begin_pass(self) -> None:
         """Begin a pass at the first time."""
         self._jumps.begin()
+        self._impacts.begin()
         for modes in self._hysteresis:
             modes.begin(self._first)
         self._end = ElementEnd(self._reader.active_set(self._first))
@@ -94,14 +97,31 @@ class ElementSolver:
         return SimulatedElement(h, end.activity, events)
 
     def _arrivals(self, element):
-        return [position for source in (*self._hysteresis, self._jumps) for position in source.find_arrivals(element)]
+        return [position for source in self._sources() for position in source.find_arrivals(element)]
+
+    def _sources(self):
+        return (*self._hysteresis, self._jumps, self._impacts)
 
     def _pass_boundary(self, element):
         # jumps first: conditions of modes are evaluated right of the boundary
-        events = [name for source in (self._jumps, *self._hysteresis) for name in source.pass_boundary(element)]
+        sources = (self._jumps, self._impacts, *self._hysteresis)
+        events = [name for source in sources for name in source.pass_boundary(element)]
         if events:
             self._end = replace(self._end, values=None)
         return events
+
+    def _solve_impact(self, b, closed):
+        """Solve the laws of impact at boundary b."""
+        equations = self._reader.boundary(b, closed)
+        impact = self._class(equations, None, (1.0,))
+        answer = impact.mpcc.solve(equations)
+        self._progress.check_time()
+        if answer.stationarity != 'B':
+            raise self._progress.error(
+                f"the impact at time {self._progress.time:.6g} has no solution: {answer.reason or answer.outcome}",
+                "check the directions of the contact forces, and the masses",
+            )
+        impact.mpcc.write(equations)
 
     def _step(self, element, most, warm):
         """Solve one element with a length of at most ``most``; returns its length and its ``ElementEnd``."""
@@ -120,18 +140,20 @@ class ElementSolver:
         if element.n not in self._equations:
             with phase(self._timer, 'read'):
                 functions = {}
-                for source in (*self._hysteresis, self._jumps):
+                for source in self._sources():
                     functions |= source.event_functions(element)
                 self._equations[element.n] = self._reader.element(element, functions)
         return self._equations[element.n]
 
     def _class_of(self, equations, element):
+        if equations.element_class not in self._classes:
+            refuse_undetermined(equations)
+        return self._class(equations, element.length, self._grid.tau)
+
+    def _class(self, equations, nominal, tau):
         key = equations.element_class
         if key not in self._classes:
-            refuse_undetermined(equations)
-            self._classes[key] = ElementClass(
-                equations, element.length, self._grid.tau, self._options, self._timer, self._progress.deadline
-            )
+            self._classes[key] = ElementClass(equations, nominal, tau, self._options, self._timer, self._progress.deadline)
         return self._classes[key]
 
     def _values_before(self, equations, element):

@@ -5,6 +5,7 @@ Does not apply: to inequalities of the user, which do not determine a simulation
 
 from collections import defaultdict
 from collections.abc import Container
+from dataclasses import replace
 from itertools import chain
 
 from pyomo.common.collections import ComponentSet
@@ -61,6 +62,12 @@ class EquationReader:
                 self._rows_of[n + later].append(c)
             for (n, _), v in block.copy.items() if block is not None else ():
                 self._copies_of[n + later].append(v)
+        impacts = None if self._moving.state_jumps is None else self._moving.state_jumps.impacts
+        if impacts is not None and impacts.drift is not None:
+            for (_, n, _), v in impacts.drift.items():
+                self._copies_of[n].append(v)
+            for (_, n, _), c in impacts.closed.items():
+                self._rows_of[n].append(c)
 
     def _read_grid_rows(self):
         """Signs and left limits by label, signs after jumps by element."""
@@ -96,6 +103,14 @@ class EquationReader:
         points = {f.name: PointPairs.read(f, element) for f in self._moving.complementarities}
         chosen = [self._moving.r[n], *self._copies_of[n]]
         return self._equations(rows, event_functions, pairs, points, conditions, labels, chosen)
+
+    def boundary(self, b: int, closed: Container[str]) -> ElementEquations:
+        """Return the laws of impact at boundary ``b`` for the ``closed`` contacts, whose gaps are taken for zero."""
+        jumps = self._moving.state_jumps
+        copies, copied = ([found[i] for i in found if i[0] == b] for found in (jumps.copy, jumps.copied))
+        pairs = [*jumps.impacts.closed_pairs(b, closed), *map(read_complementarity, jumps.impacts.slip_pairs(b))]
+        rows = [*jumps.impacts.rows(b, closed), *copied]
+        return replace(self._equations(rows, {}, pairs, {}, [], (), [*jumps.impacts.unknown(b, closed), *copies]), length=None)
 
     def _equations(self, constraints, event_functions, pairs, points, conditions, labels, chosen=()):
         """Assemble the record; ``chosen`` are unknowns whatever the equations contain, the length multiplier first."""

@@ -25,6 +25,10 @@ class ZeroArrivals:
     def __init__(self):
         self._largest = {}
 
+    def at_least(self, key: Hashable, size: float) -> None:
+        """Let ``size`` count among the values of the function ``key``: one that is zero throughout has none of its own."""
+        self._largest[key] = max(self._largest.get(key, 0.0), size)
+
     def zero(self, key: Hashable, values: Sequence[float]) -> float:
         """Return the size below which the function ``key`` is zero."""
         self._largest[key] = max(self._largest.get(key, 0.0), *map(abs, values))

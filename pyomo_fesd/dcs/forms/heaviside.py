@@ -8,7 +8,7 @@ not matter to a mode (S_ik = 0) leaves no factor, and a function that matters to
 two sides of one function, nu_1 = alpha and nu_2 = 1 - alpha (eq. 5): the smallest form.
 
 Takes: a ``ModeSystem`` whose ``implicants`` say which signs matter.
-Leaves: the step functions (``step.py``), with an index k in front of the side where there are several; ``mode`` (eq. 7).
+Leaves: the step functions (``core/step.py``), with an index k in front of the side where there are several; ``mode`` (eq. 7).
 Does not apply: where the weights would not sum up to 1 at some point at which several boundaries meet
     (``reading/sign_implicants.py``).
 """
@@ -19,7 +19,7 @@ from math import prod
 from pyomo.core import RangeSet
 from pyomo.core.base.block import BlockData
 
-from pyomo_fesd.dcs.forms.step import add_step, declare_step
+from pyomo_fesd.core import add_step, declare_step
 from pyomo_fesd.dcs.reading import ModeSystem, not_covered_once
 
 NAME = 'heaviside'

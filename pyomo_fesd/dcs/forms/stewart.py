@@ -8,18 +8,13 @@ Applies always; for two modes the Heaviside form is smaller.
 """
 
 from collections.abc import Iterable
-from math import nan
 
-from pyomo.core import Constraint, RangeSet, Var
 from pyomo.core.base.block import BlockData
-from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import Dependents, switched_systems, value_or_zero
+from pyomo_fesd.core import add_smallest, declare_smallest
 from pyomo_fesd.dcs.reading import ModeSystem
 
 NAME = 'stewart'
-#: Distances below this are 0.
-ZERO = 1e-8
 
 
 def applies(system: ModeSystem) -> bool:
@@ -44,51 +39,17 @@ def _modes_of_regions(system):
 
 def declare(block: BlockData, sets: tuple, regions: int) -> None:
     """Declare the components of the form over ``sets`` for a number of ``regions``."""
-    block.regions = RangeSet(regions)
-    block.nu = Var(*sets, block.regions, dense=False, bounds=(0, 1))
-    block.lam = Var(*sets, block.regions, dense=False, bounds=(0, None))
-    block.mu = Var(*sets, **({'dense': False} if sets else {}))
-    block.stationarity = Constraint(*sets, block.regions)
-    block.simplex = Constraint(*sets)
-    block.complementarity = Complementarity(*sets, block.regions)
-    for variable in (block.lam, block.mu):
-        switched_systems(block).continuous[variable] = block.stationarity
+    declare_smallest(block, sets, regions)
 
 
 def add(block: BlockData, index: tuple, system: ModeSystem) -> None:
     """Add one time of one Disjunction."""
     patterns = [pattern for owned in system.regions.geometry.patterns for pattern in owned]
-    minimise(
+    add_smallest(
         block,
         index,
         [sum(-c if sign > 0 else c for sign, c in zip(pattern, system.regions.functions)) for pattern in patterns],
     )
-
-
-def minimise(block: BlockData, index: tuple, g: list) -> list:
-    """Add the linear program whose solution nu weights the smallest of the functions g_i; return nu."""
-    nu = [block.nu[(*index, i)] for i in block.regions]
-    lam = [block.lam[(*index, i)] for i in block.regions]
-    mu = block.mu[index or None]
-    mu.value, *found = minimum_values([value_or_zero(g_i) for g_i in g])
-    for i, g_i in enumerate(g):
-        nu[i].value, lam[i].value = 1 / len(g), found[i]
-        block.stationarity.add((*index, i + 1), g_i - lam[i] - mu == 0)
-        block.complementarity.add((*index, i + 1), complements(nu[i] >= 0, lam[i] >= 0))
-        if i:
-            # all but one: the last follows from the simplex
-            switched_systems(block).selectors.add(nu[i])
-    block.simplex.add(index or None, sum(nu) == 1)
-    switched_systems(block).dependents.append(Dependents((mu, *lam, *nu), tuple(g), minimum_values))
-    return nu
-
-
-def minimum_values(g: list[float]) -> list[float]:
-    """Return mu, lam and nu of values of the functions g_i; nu of the smallest ones is nan, open, where there are several."""
-    mu = min(g)
-    lam = [g_i - mu for g_i in g]
-    zero = [distance <= ZERO for distance in lam]
-    return [mu, *lam, *(0.0 if not small else 1.0 if sum(zero) == 1 else nan for small in zero)]
 
 
 def weight(block: BlockData, index: tuple, system: ModeSystem, modes):

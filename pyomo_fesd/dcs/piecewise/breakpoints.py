@@ -1,7 +1,7 @@
 """Write the boundaries q(x) = b at which piecewise functions change, each once however many functions share it.
 
     max(0, q - b) = s               a positive part (core/positive_part.py; theory, eq. 8)
-    1 where q > b, 0 where q < b    alpha, a step (forms/step.py; theory, eq. 5), whose p is max(0, q - b)
+    1 where q > b, 0 where q < b    alpha, a step (core/step.py; theory, eq. 5), whose p is max(0, q - b)
 
 A quantity q that is an affine function of another one at the same time is the same quantity: ``x``, ``1 - x`` and
 ``2*x + y - y`` share their boundaries (``quantities.py``).
@@ -16,8 +16,15 @@ from bisect import bisect_left
 
 from pyomo.core import Block, Constraint, Set
 
-from pyomo_fesd.core import Surface, add_positive_part, declare_positive_part, discretised, switched_systems
-from pyomo_fesd.dcs.forms import add_step, declare_step
+from pyomo_fesd.core import (
+    Surface,
+    add_positive_part,
+    add_step,
+    declare_positive_part,
+    declare_step,
+    discretised,
+    switched_systems,
+)
 from pyomo_fesd.dcs.piecewise.generated_blocks import delete_data
 from pyomo_fesd.dcs.piecewise.quantities import SAME, Quantities, shortened
 

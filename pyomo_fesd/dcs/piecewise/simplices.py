@@ -6,7 +6,7 @@ the one whose plane a_i^T x + b_i is the largest, so
     g_i(x) = -(a_i^T x + b_i)        and        y = sum_i nu_i f_i(x)
 
 Takes: a ``PiecewiseLinearFunction`` of several arguments that depend on time.
-Leaves: Stewart's form (``forms/stewart.py``) over time and simplex, and ``domain``, the sides of the domain that bounds do not
+Leaves: Stewart's form (``core/smallest.py``) over time and simplex, and ``domain``, the sides of the domain that bounds do not
     imply.
 Does not apply: to continuous functions, which need fewer variables by their vertices (``multivariate.py``).
 """
@@ -14,7 +14,7 @@ Does not apply: to continuous functions, which need fewer variables by their ver
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
 from pyomo.core import Constraint, RangeSet
 
-from pyomo_fesd.dcs.forms import stewart
+from pyomo_fesd.core import add_smallest, declare_smallest
 from pyomo_fesd.dcs.piecewise.generated_blocks import delete_data
 
 
@@ -32,13 +32,13 @@ def _simplex_weights(text, triangulation, args, context):
         return [block.nu[time, i] for i in block.regions]
     block, x, facets = blocks.new(time, args, text, key), triangulation.local(args), triangulation.facets()
     if block.component('domain') is None:
-        stewart.declare(block, (blocks.wrt,), len(triangulation.simplices))
+        declare_smallest(block, (blocks.wrt,), len(triangulation.simplices))
         block.sides = RangeSet(len(facets))
         block.domain = Constraint(blocks.wrt, block.sides)
     blocks.undo.callback(delete_data, block, (time,))
     for k, facet in enumerate(facets, start=1):
         _keep_inside(block, (time, k), _affine(facet, x))
-    return stewart.minimise(block, (time,), [-_affine(plane, x) for plane in triangulation.planes])
+    return add_smallest(block, (time,), [-_affine(plane, x) for plane in triangulation.planes])
 
 
 def _keep_inside(block, index, side):

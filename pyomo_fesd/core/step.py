@@ -1,4 +1,4 @@
-"""The step function of an expression c, from which the Heaviside form and all functions that jump are made (theory, eq. 5).
+"""The step function of an expression c: the Heaviside form, functions that jump and friction are made of it (theory, eq. 5).
 
     c = p - n,    0 <= alpha  perp  n >= 0,    0 <= 1 - alpha  perp  p >= 0
 
@@ -6,7 +6,7 @@ so alpha is 1 where c > 0 and 0 where c < 0; p = max(0, c) and n = max(0, -c) ar
 
 Takes: a block of its own, and c as an expression.
 Leaves: ``alpha``, ``p``, ``n``, ``switching`` (c = p - n) and ``complementarity`` (its last index: 1 and 2) on that block.
-Does not apply: to continuous piecewise functions, which need one variable only (``core/positive_part.py``).
+Does not apply: to continuous piecewise functions, which need one variable only (``positive_part.py``).
 """
 
 from math import nan
@@ -16,7 +16,8 @@ from pyomo.core.base.block import BlockData
 from pyomo.core.base.var import VarData
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import Dependents, Step, switched_systems, value_or_zero
+from pyomo_fesd.core.evaluation import value_or_zero
+from pyomo_fesd.core.switched_systems import Dependents, Step, switched_systems
 
 #: Values below this are 0.
 ZERO = 1e-8
