@@ -36,6 +36,9 @@ class ElementSolver:
         self._moving = moving_grids(model)[wrt]
         self._grid, self._hysteresis = self._moving.grid, read_hysteresis(self._moving)
         self._jumps = JumpEvents(self._moving.state_jumps)
+        if self._moving.state_jumps is not None and self._moving.state_jumps.impacts is not None:
+            # gaps and forces of contacts are 0 to round-off over long times, which is no size
+            self._options = {'natural_units': 'user'} | self._options
         self._impacts = ImpactEvents(self._moving.state_jumps, self._times, self._solve_impact)
         given = given_variables(model, self._times, inputs, self._moving.held)
         given.update(v for some in self._hysteresis for e in self._grid.elements for v in some.variables(e.right))

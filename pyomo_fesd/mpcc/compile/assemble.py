@@ -111,8 +111,9 @@ def _factors_by_size(nl, index, sides, at, variables, given_x, given_g, hints):
     cancelling = np.concatenate([nl.cancelling[index.model_rows], _of_rows(nl.cancelling, sides)])
     cancelling = np.maximum(cancelling, parameter_terms(all_rows, w, p, begin, at[1]))
     J, constants = _linearised(function, begin, at[1], bounds, cancelling)
-    # sides are zero at solutions, and so may be what is left of them; a state may begin at any small number
-    certain = without_small(constants)
+    # sides are zero at solutions, and so may be what is left of them
+    certain = constants.copy()
+    certain[len(index.model_rows) :] = without_small(certain[len(index.model_rows) :])
     columns = {id(v): j for j, v in enumerate(variables)}
     alike = [[columns[id(v)] for v in group if id(v) in columns] for group in hints.alike]
     s_x = variable_factors(J, (certain, constants), at[0], stated_bounds(variables), given_x, [group for group in alike if group])
