@@ -2,6 +2,7 @@
 
 Takes: a moving grid whose states and weights have their values.
 Leaves: values of ``e`` of the state jumps, and of ``n`` and ``m`` of the modes with hysteresis.
+Does not apply: to impulses of contacts, which keep their values.
 """
 
 import numpy as np

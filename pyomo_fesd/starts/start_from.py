@@ -57,7 +57,8 @@ def start_from(model: Block, source: pd.DataFrame | Block, wrt: ContinuousSet | 
     * Multipliers of modes are those of the next row.  A control that is held gets the mean over its control stage of what the
       rows give, each of them since the row before.
     * What follows from these values is computed: derivatives, other algebraic variables, the parts and multipliers of switching
-      functions, variables of element boundaries, and integrals.
+      functions, variables of element boundaries, and integrals.  Impulses of a ``contact`` keep their values: ``simulate`` finds
+      them.
 
     Raises
     ------
