@@ -6,8 +6,8 @@ them.  The size of a variable is, in this order,
 * the inverse of its factor, where the user gives one;
 * its largest start value, or that of the variables ``alike`` (the same quantity at other places), unless that is small: what is
   zero at a solution starts at any small number in the next solve;
-* by its rows: s_j = (min_i max_i)^(1/2) of max(b_i, max_k |J_ik| s_k)/|J_ij| over the rows i with terms of known size; first by
-  those rows in which no other variable is without a size.
+* by its rows: s_j = max_i max(b_i, max_k |J_ik| s_k)/|J_ij| over the rows i with terms of known size; first by those rows
+  in which no other variable is without a size.
 
 Variables of a mild size keep the factor 1, and so do rows whose largest gradient entry is mild; others get the inverse, as a power
 of 2, which no rounding follows.
@@ -119,7 +119,6 @@ def _by_rows(entries, b, sizes, group):
     np.maximum.at(terms, i, coefficients * sizes[j])
     open_ = (sizes[j] == 0) & (terms[i] > 0)
     found = terms[i[open_]] / coefficients[open_]
-    low, high = np.full(sizes.size, np.inf), np.zeros(sizes.size)
-    np.minimum.at(low, group[j[open_]], found)
-    np.maximum.at(high, group[j[open_]], found)
-    return np.where(high > 0, np.sqrt(np.where(high > 0, low, 0.0)) * np.sqrt(high), 0.0)[group]
+    largest = np.zeros(sizes.size)
+    np.maximum.at(largest, group[j[open_]], found)
+    return largest[group]
