@@ -108,6 +108,14 @@ def test_a_size_follows_from_the_data_of_the_rows():
     assert s[0] == pytest.approx(1 / 2e-9, rel=0.5) and s[1] == pytest.approx(1 / 2e-2, rel=50)
 
 
+@pytest.mark.parametrize('x0', [1e-12, 1e-9, 1e-6])
+def test_a_small_first_value_is_no_size_where_a_rate_shows_another(x0):
+    # x - x0 - dx = 0, dx = 3; and two parts p - n = x0 at the first time, p' - n' = x later, each part of one size
+    J = [[1, -1, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0], [0, 0, 1, -1, 0, 0], [-1, 0, 0, 0, 1, -1]]
+    found = factors(J, [x0, 3, x0, 0], [0] * 6, alike=[[2, 4], [3, 5]])
+    assert found.tolist() == [1.0] * 6
+
+
 def test_what_is_zero_at_a_solution_has_no_size():
     assert (factors([[1.0, 1.0]], [1.0], [1.0, 1e-9]) == 1).all()
 
