@@ -1,7 +1,8 @@
 """A start that is a solution already: without an objective every feasible, exactly complementary point is one.
 
 Decided pairs (eq. 13) count as far as a branch can satisfy them from there: the branch that the start names is solved with their
-constraints in force, and without the penalty, which would lead away from the start.
+constraints in force, and without the penalty, which would lead away from the start.  Where it has no solution, the start is one
+without them.
 """
 
 import numpy as np
@@ -32,12 +33,14 @@ def feasible_start(c, subsolves, w) -> tuple[Point | None, str]:
     if not found.feasible:
         return None, f"not feasible: {_most_violated(c, w)}"
     at, tolerances = c.evaluate(w), subsolves.tolerances
-    equal = at.eta > tolerances.eta
-    if max(found.violation_scaled, found.complementarity_scaled) <= EXACT and not np.any(np.abs(c.decided(w))[equal] > EXACT):
-        nlp = NlpResult(w, at.f, 'start', 0, np.zeros(len(c.lbg)), np.zeros(len(w)))
-    else:
+    equal, is_exact = at.eta > tolerances.eta, max(found.violation_scaled, found.complementarity_scaled) <= EXACT
+    nlp = unchanged = NlpResult(w, at.f, 'start', 0, np.zeros(len(c.lbg)), np.zeros(len(w)))
+    if not is_exact or np.any(np.abs(c.decided(w))[equal] > EXACT):
         zero = active_sets(at.G, at.H, tolerances.biactive).zero
         nlp = subsolves.branch(w, zero, equal, 0.0, settled=tolerances.feasibility)
+    if nlp is None and is_exact:
+        # the decisions only choose among solutions, and none of these satisfies them
+        nlp, equal = unchanged, np.zeros_like(equal)
     if nlp is None:
         return None, f"its branch has no solution: {_most_violated(c, w, equal)}"
     certificate = subsolves.certify(nlp, equal)
