@@ -55,7 +55,7 @@ def test_a_simulation_says_how_far_it_came(monkeypatch):
 
 
 def test_a_refinement_keeps_the_last_round_in_time(monkeypatch, caplog):
-    monkeypatch.setattr(round_solver, 'simulate', slow(pyomo_fesd.simulate, 0.5))
+    monkeypatch.setattr(round_solver, 'simulate', slow(pyomo_fesd.simulate, 1.0))
     m = dcs(model())
     began = time.perf_counter()
     found = pyomo_fesd.refine(m, 1e-12, time_limit=4.0)
