@@ -8,6 +8,7 @@ import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 import thermostat
+from problems import laws
 from problems.running import move
 from pyomo.contrib.solver.common.factory import SolverFactory as SolverFactoryV2
 from pyomo.contrib.solver.common.results import SolutionStatus
@@ -215,3 +216,15 @@ def test_a_failure_of_the_simulation_is_no_failure(monkeypatch):
     assert 'without success: t: simulate: it cannot go on' in log
     assert results.solution_status is SolutionStatus.optimal
     assert times(m) == pytest.approx([2 / 3], abs=1e-6)
+
+
+def test_a_march_whose_elements_cannot_be_even_is_a_solution():
+    # the tank is empty at t = 2, where its outflow has an infinite slope: the elements beside it end where the march put them
+    case = laws.torricelli()
+    m = case.model
+    pyo.TransformationFactory('fesd.dcs').apply_to(m)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=10, ncp=3)
+    results = pyo.SolverFactory('mpec_hybrid').solve(m)
+    pyo.assert_optimal_termination(results)
+    assert results.solver.nlps <= 1 and results.solver.violation <= 1e-12
+    assert case.found() == pytest.approx(case.exact, abs=1e-12)
