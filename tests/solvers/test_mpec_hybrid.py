@@ -175,7 +175,7 @@ def test_ctrl_c_during_an_nlp_ends_with_a_result(monkeypatch):
 
     def press(watch, *buffers):
         if next(iterations) == 3:
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
         return ask(watch, *buffers)
 
     monkeypatch.setattr(casadi_solvers._StopCallback, 'eval_buffer', press)
