@@ -7,6 +7,8 @@ From (0, 0.5) at rest to q = (4, 0.5) at T = 4; |u| <= 9, u is constant on each 
 Source: problem 'throwing a ball' of NOSNOC.
 """
 
+from math import log, pi, sqrt
+
 import numpy as np
 import pyomo.dae as dae
 import pyomo.environ as pyo
@@ -20,6 +22,8 @@ START, GOAL = (0.0, 0.5), (4.0, 0.5)
 U_MAX = 9.0
 U_RANGE, CONTROLS = (-U_MAX, U_MAX), 2
 FORMS = ('contact',)
+#: Time-freezing in nosnoc: the stiffness of the auxiliary spring, and the range of the speed of time.
+STIFFNESS, SPEED = 10.0, (1.0, 25.0)
 
 
 def final_cost(q, v):
@@ -68,3 +72,33 @@ AT_START = (START, (0.0, 0.0))
 def missed(outcome):
     """Distance to the target."""
     return float(np.abs(outcome.q - GOAL).max())
+
+
+def twin():
+    """The same problem in nosnoc by elastic time-freezing: below the floor a damped spring returns the ball in frozen time."""
+    import casadi as ca
+    from benchmarks.hard_ocp import nosnoc_peer
+
+    q, v, t, u, speed = nosnoc_peer.symbols(2, 2)
+    alpha, decay = ca.SX.sym('alpha'), abs(log(RESTITUTION))
+    damping = 2 * decay * sqrt(STIFFNESS / (decay**2 + pi**2))
+    flight = speed * ca.vertcat(v, u[0], u[1] - G, 1)
+    bounce = speed * ca.vertcat(0, v[1], 0, -STIFFNESS * q[1] - damping * v[1], 0)
+    given = {
+        'x': ca.vertcat(q, v, t),
+        'u': ca.vertcat(u, speed),
+        't_var': t,
+        'alpha': [alpha],
+        'c': [q[1]],
+        'f_x': [alpha * flight + (1 - alpha) * bounce],
+    }
+    costs = {
+        'f_q': speed * ca.sumsqr(u),
+        'f_terminal': final_cost(None, ca.vertsplit(v)),
+        'g_terminal': q - np.array(GOAL),
+        'g_path': ca.sumsqr(u),
+        'lbg': np.array([-np.inf]),
+        'ubg': np.array([U_MAX**2]),
+    }
+    far = np.full(4, np.inf)
+    return nosnoc_peer.Twin(given, (-far, far, SPEED), costs, ipopt={'max_iter': 1000})

@@ -22,6 +22,8 @@ LOWEST, HIGHEST = (-15.0, -15.0, -10.0), (10.0, 15.0, 15.0)
 U_MAX, V_MAX = 20.0, 5.0
 U_RANGE, CONTROLS = (-U_MAX, U_MAX), 1
 FORMS = ('contact',)
+#: Time-freezing in nosnoc: the auxiliary force, and the range of the speed of time.
+PUSH, SPEED = 100.0, (1.0, 25.0)
 
 
 def distance(q, v):
@@ -82,3 +84,31 @@ def missed(outcome):
     """By how much a path leaves the bounds."""
     q, v = np.array(outcome.positions), np.array(outcome.velocities)
     return float(max(0, (q - HIGHEST).max(), (LOWEST - q).max(), np.abs(v).max() - V_MAX))
+
+
+def twin():
+    """The same problem in nosnoc, after its multi-contact time-freezing: each contact has an auxiliary force."""
+    import casadi as ca
+    from benchmarks.hard_ocp import nosnoc_peer
+
+    q, v, t, u, speed = nosnoc_peer.symbols(3, 1)
+    alpha, free, frozen = ca.SX.sym('alpha', 4), ca.SX.sym('free'), ca.SX.sym('frozen', 2)
+    normal = ca.DM([[-1, 1, 0], [0, -1, 1]])
+    closed = [(1 - alpha[k]) * (1 - alpha[k + 2]) for k in range(2)]
+    flight = speed * ca.vertcat(v, ca.vertcat(0, u, 0) - DRAG * v, 1)
+    pushes = [ca.vertcat(ca.SX.zeros(3), PUSH * normal[k, :].T, 0) for k in range(2)]
+    given = {
+        'x': ca.vertcat(q, v, t),
+        'u': ca.vertcat(u, speed),
+        't_var': t,
+        'alpha': [alpha],
+        'c': [ca.vertcat(normal @ q - LENGTH, normal @ v)],
+        'f_x': [free * flight + frozen[0] * pushes[0] + frozen[1] * pushes[1]],
+        'z': ca.vertcat(free, frozen),
+        'z0': np.ones(3),
+        'g_z': ca.vertcat(free - (1 - closed[0]) * (1 - closed[1]), frozen - ca.vertcat(*closed)),
+    }
+    q_, v_ = ca.vertsplit(q), ca.vertsplit(v)
+    costs = {'f_q': speed * (distance(q_, v_) + 0.1 * u**2), 'f_terminal': final_cost(q_, v_)}
+    fast = np.full(3, V_MAX)
+    return nosnoc_peer.Twin(given, ([*LOWEST, *-fast], [*HIGHEST, *fast], SPEED), costs, ipopt={'max_iter': 1000})

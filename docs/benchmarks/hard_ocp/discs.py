@@ -101,10 +101,9 @@ def _with_contact(elements, **options):
 def _with_frozen_time(elements, clock='speed', **options):
     m = _bodies()
     clocked = grid.clock(m, clock, HORIZON / STAGES, SPEED)
-    m.time, m.paid, m.frozen = pyo.Var(m.t, initialize=lambda m, t: t), pyo.Var(m.t, initialize=0), pyo.Var(m.t, initialize=0)
-    m.dtime, m.dpaid = dae.DerivativeVar(m.time, wrt=m.t), dae.DerivativeVar(m.paid, wrt=m.t)
+    m.time, m.frozen = pyo.Var(m.t, initialize=lambda m, t: t), pyo.Var(m.t, initialize=0)
+    m.dtime = dae.DerivativeVar(m.time, wrt=m.t)
     m.time[0].fix(0)
-    m.paid[0].fix(0)
 
     @m.Disjunction(m.t)
     def contact(m, t):
@@ -126,8 +125,8 @@ def _with_frozen_time(elements, clock='speed', **options):
 
     m.tick = pyo.Constraint(m.t, rule=lambda m, t: m.dtime[t] == m.runs[t])
     m.stage_ends = pyo.Constraint(grid.ends(HORIZON, STAGES)[1:], rule=lambda m, t: m.time[t] == t)
-    m.pay = pyo.Constraint(m.t, rule=lambda m, t: m.dpaid[t] == m.runs[t] * running(_at(m, t)[0], _at(m, t)[2]))
-    m.cost = pyo.Objective(expr=m.paid[HORIZON] + final_cost(*_at(m, HORIZON)[:2]))
+    m.track = dae.Integral(m.t, rule=lambda m, t: m.runs[t] * running(_at(m, t)[0], _at(m, t)[2]))
+    m.cost = pyo.Objective(expr=m.track + final_cost(*_at(m, HORIZON)[:2]))
     pyo.TransformationFactory('fesd.dcs').apply_to(m)
     return grid.moving_grid(m, elements, [m.u], **clocked, **options)
 
@@ -151,3 +150,31 @@ def missed(outcome):
     """By how much a path leaves the bounds."""
     q, v = np.array(outcome.positions), np.array(outcome.velocities)
     return float(max(0, np.abs(q).max() - Q_MAX, np.abs(v).max() - V_MAX))
+
+
+def twin():
+    """The same problem in nosnoc, with the settings of its own example."""
+    import casadi as ca
+    from benchmarks.hard_ocp import nosnoc_peer
+
+    q, v, t, u, speed = nosnoc_peer.symbols(4, 2)
+    alpha, free, frozen = ca.SX.sym('alpha', 2), ca.SX.sym('free'), ca.SX.sym('frozen')
+    q_, v_, u_ = (ca.vertsplit(part) for part in (q, v, u))
+    n, inverse = ca.vertcat(*normal(q_)), ca.diag(1 / MASSES)
+    force = ca.vertcat(u, 0, 0) - ca.vertcat(*drags(v_, ca.sqrt))
+    flight = speed * ca.vertcat(v, inverse @ force, 1)
+    push = ca.vertcat(ca.SX.zeros(4), PUSH * inverse @ n, 0)
+    given = {
+        'x': ca.vertcat(q, v, t),
+        'u': ca.vertcat(u, speed),
+        't_var': t,
+        'alpha': [alpha],
+        'c': [ca.vertcat(gap(q_), ca.dot(n, v))],
+        'f_x': [free * flight + frozen * push],
+        'z': ca.vertcat(free, frozen),
+        'z0': np.ones(2),
+        'g_z': ca.vertcat(free - (alpha[0] + alpha[1] - alpha[0] * alpha[1]), frozen - (1 - alpha[0]) * (1 - alpha[1])),
+    }
+    reach = np.repeat([Q_MAX, V_MAX], 4)
+    costs = {'f_q': speed * running(q_, u_), 'f_terminal': final_cost(q_, v_)}
+    return nosnoc_peer.Twin(given, (-reach, reach, SPEED), costs, {'max_iter_homotopy': 7}, {'max_iter': 1000})

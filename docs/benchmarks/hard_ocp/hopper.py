@@ -77,16 +77,17 @@ def build(form='contact', elements=ELEMENTS, ncp=NCP, **options):
     return {'contact': _with_contact, 'time_freezing': _with_frozen_time}[form](elements, ncp=ncp, **options)
 
 
-def _bodies(start_along_reference):
+def _bodies(guess):
+    """``guess`` of the positions: 'start', or 'reference'."""
     m = pyo.ConcreteModel()
     times, points = grid.ends(HORIZON, STAGES), reference()
     m.t = dae.ContinuousSet(initialize=times)
     m.i, m.j = pyo.RangeSet(4), pyo.RangeSet(2)
 
-    def guess(m, i, t):
-        return points[min(STAGES, round(t * STAGES / HORIZON)), i - 1] if start_along_reference else START[i - 1]
+    def place(m, i, t):
+        return START[i - 1] if guess == 'start' else points[round(t * STAGES / HORIZON), i - 1]
 
-    m.q = pyo.Var(m.i, m.t, initialize=guess, bounds=lambda m, i, t: (LOWEST[i - 1], HIGHEST[i - 1]))
+    m.q = pyo.Var(m.i, m.t, initialize=place, bounds=lambda m, i, t: (LOWEST[i - 1], HIGHEST[i - 1]))
     m.v = pyo.Var(m.i, m.t, initialize=0, bounds=lambda m, i, t: (-V_MAX[i - 1], V_MAX[i - 1]))
     m.u = pyo.Var(m.j, m.t, initialize=0, bounds=(-U_MAX, U_MAX))
     wanted = {(i, t): float(point[i - 1]) for t, point in zip(times[1:], points[1:]) for i in m.i}
@@ -119,9 +120,9 @@ def _no_slip(m, force):
     m.no_slip = Complementarity(m.t, rule=lambda m, t: complements(force(m, t) >= 0, m.w[t] >= 0))
 
 
-def _with_contact(elements, no_slip=True, **options):
+def _with_contact(elements, no_slip=True, guess='start', **options):
     """``no_slip`` False leaves out the condition on the foot; Coulomb's law remains."""
-    m = _bodies(start_along_reference=True)
+    m = _bodies(guess)
     m.ground = pyomo_fesd.contact(m.t, gap=lambda m, t: gap(_at(m, t)[0], pyo), friction=FRICTION, slip=_slip)
     if no_slip:
         _no_slip(m, lambda m, t: m.ground[t].normal)
@@ -139,8 +140,8 @@ def _with_contact(elements, no_slip=True, **options):
     return grid.moving_grid(m, elements, [m.u, m.wanted], **options)
 
 
-def _with_frozen_time(elements, clock='speed', **options):
-    m = _bodies(start_along_reference=False)
+def _with_frozen_time(elements, clock='speed', guess='start', **options):
+    m = _bodies(guess)
     clocked = grid.clock(m, clock, HORIZON / STAGES, SPEED)
     m.time = pyo.Var(m.t, initialize=lambda m, t: t)
     m.dtime = dae.DerivativeVar(m.time, wrt=m.t)
@@ -172,7 +173,7 @@ def _with_frozen_time(elements, clock='speed', **options):
 
     m.tick = pyo.Constraint(m.t, rule=lambda m, t: m.dtime[t] == m.runs[t])
     m.stage_ends = pyo.Constraint(grid.ends(HORIZON, STAGES)[1:], rule=lambda m, t: m.time[t] == t)
-    m.track = dae.Integral(m.t, rule=lambda m, t: m.speed[t] * running(*_at(m, t), [m.wanted[i, t] for i in m.i]))
+    m.track = dae.Integral(m.t, rule=lambda m, t: m.runs[t] * running(*_at(m, t), [m.wanted[i, t] for i in m.i]))
     m.cost = pyo.Objective(expr=m.track + final_cost(*_at(m, HORIZON)[:2]))
     pyo.TransformationFactory('fesd.dcs').apply_to(m, form='heaviside')
     return grid.moving_grid(m, elements, [m.u, m.wanted], continuous=[m.w], **clocked, **options)
@@ -204,3 +205,40 @@ def missed(outcome):
     """The way that the foot has slipped, or by how much a path leaves the bounds."""
     q, v = np.array(outcome.positions), np.array(outcome.velocities)
     return float(max(outcome.slipped, (q - HIGHEST).max(), (LOWEST - q).max(), (np.abs(v) - V_MAX).max(), 0))
+
+
+def twin():
+    """The same problem in nosnoc, with the settings of its own example."""
+    import casadi as ca
+    from benchmarks.hard_ocp import nosnoc_peer
+
+    q, v, t, u, speed = nosnoc_peer.symbols(4, 2)
+    alpha, free, forward, backward = ca.SX.sym('alpha', 3), *(ca.SX.sym(name) for name in ('free', 'forward', 'backward'))
+    q_, v_, u_ = (ca.vertsplit(part) for part in (q, v, u))
+    n, tan, inverse = ca.vertcat(*normal(q_, ca)), ca.vertcat(*tangent(q_, ca)), ca.diag(1 / MASSES)
+    flight = speed * ca.vertcat(v, inverse @ ca.vertcat(*drive(q_, u_, ca)), 1)
+    pushes = [ca.vertcat(ca.SX.zeros(4), PUSH * inverse @ (n + side * FRICTION * tan), 0) for side in (-1, 1)]
+    closed = (1 - alpha[0]) * (1 - alpha[1])
+    slip, wanted = ca.dot(tan, v), ca.SX.sym('wanted', 4)
+    given = {
+        'x': ca.vertcat(q, v, t),
+        'u': ca.vertcat(u, speed),
+        't_var': t,
+        'alpha': [alpha],
+        'c': [ca.vertcat(gap(q_, ca), ca.dot(n, v), slip)],
+        'f_x': [free * flight + forward * pushes[0] + backward * pushes[1]],
+        'z': ca.vertcat(free, forward, backward),
+        'z0': np.ones(3),
+        'g_z': ca.vertcat(free - (1 - closed), forward - closed * alpha[2], backward - closed * (1 - alpha[2])),
+        'p_time_var': wanted,
+        'p_time_var_val': WANTED,
+    }
+    costs = {
+        'f_q': speed * running(q_, v_, u_, ca.vertsplit(wanted)),
+        'f_terminal': final_cost(q_, v_),
+        'g_path_comp': ca.horzcat(ca.vertcat(slip, -slip), ca.vertcat(forward + backward, forward + backward)),
+    }
+    bounds = ([*LOWEST, *(-np.array(V_MAX))], [*HIGHEST, *V_MAX], SPEED)
+    settings = {'comp_tol': 1e-3, 'sigma_0': 10.0, 'max_iter_homotopy': 6}
+    ipopt = {'max_iter': 1000, 'acceptable_tol': 1e-5, 'acceptable_iter': 3, 'tol': 1e-5}
+    return nosnoc_peer.Twin(given, bounds, costs, settings, ipopt)

@@ -50,7 +50,7 @@ def replayed(p, used):
     return {'replayed': float(out.cost + p.final_cost(out.q, out.v)), 'missed': p.missed(out), 'impacts': len(out.impacts)}
 
 
-GRID = ('equilibration', 'cross_complementarity', 'ncp', 'rho', 'length_bounds', 'elements', 'clock', 'no_slip', 'scheme')
+GRID = ('equilibration', 'cross_complementarity', 'ncp', 'rho', 'length_bounds', 'elements', 'clock', 'no_slip', 'guess', 'scheme')
 
 
 def split(options):
@@ -94,6 +94,15 @@ def with_pyomo_fesd(p, form, seed, options, limit, tee=False):
     return row | replayed(p, p.controls(m))
 
 
+def with_nosnoc(p, seed):
+    """Build and solve the twin; return the row."""
+    from benchmarks.hard_ocp import nosnoc_peer
+
+    started = time.perf_counter()
+    row = nosnoc_peer.solve(p, guess(p, seed))
+    return {'seconds': time.perf_counter() - started} | row | replayed(p, row['u'])
+
+
 def option(text):
     """name=value; the value is a Python literal or a string."""
     import ast
@@ -115,6 +124,11 @@ def main():
     parser.add_argument('--tee', action='store_true')
     chosen = parser.parse_args()
     p = module(chosen.case)
+    if chosen.form == 'nosnoc':
+        row = with_nosnoc(p, chosen.seed)
+        del row['u']
+        print(json.dumps(row, default=float))
+        return
     row = with_pyomo_fesd(p, chosen.form, chosen.seed, dict(chosen.options), chosen.limit, chosen.tee)
     print(json.dumps(row, default=float))
 
