@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.hard_ocp import ball, carts, discs, hopper, run
+from benchmarks.hard_ocp import ball, carts, cases, discs, hopper
 from benchmarks.hard_ocp.replay import Plant, replay
 from scipy.optimize import brentq
 
@@ -138,5 +138,5 @@ def test_the_slip_of_the_hopper_is_the_velocity_of_its_foot():
 def test_each_model_takes_guessed_controls(p, form, monkeypatch):
     monkeypatch.setattr(p, 'STAGES', 3)
     m = p.build(form)
-    run.initialise(p, m, random_controls(p, 2))
+    cases.initialise(p, m, random_controls(p, 2))
     assert p.controls(m) == pytest.approx(random_controls(p, 2))

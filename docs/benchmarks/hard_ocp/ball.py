@@ -21,7 +21,6 @@ G, RESTITUTION = 9.81, 0.9
 START, GOAL = (0.0, 0.5), (4.0, 0.5)
 U_MAX = 9.0
 U_RANGE, CONTROLS = (-U_MAX, U_MAX), 2
-FORMS = ('contact',)
 #: Time-freezing in nosnoc: the stiffness of the auxiliary spring, and the range of the speed of time.
 STIFFNESS, SPEED = 10.0, (1.0, 25.0)
 
@@ -31,8 +30,12 @@ def final_cost(q, v):
     return 100 * sum(speed**2 for speed in v)
 
 
-def build(form='contact', elements=ELEMENTS, ncp=NCP, **options):
-    """The transformed model; ``options`` are those of ``fesd.finite_elements``."""
+def build(form='contact', **options):
+    """The transformed model in one of ``FORMS``; ``options`` are those of the form and of ``fesd.finite_elements``."""
+    return FORMS[form](**options)
+
+
+def _with_contact(elements=ELEMENTS, ncp=NCP, **options):
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(initialize=grid.ends(HORIZON, STAGES))
     m.i = pyo.RangeSet(2)
@@ -51,6 +54,10 @@ def build(form='contact', elements=ELEMENTS, ncp=NCP, **options):
     m.effort = dae.Integral(m.t, rule=lambda m, t: m.u[1, t] ** 2 + m.u[2, t] ** 2)
     m.cost = pyo.Objective(expr=m.effort + final_cost(None, [m.v[i, HORIZON] for i in m.i]))
     return grid.moving_grid(m, elements, [m.u], ncp=ncp, **options)
+
+
+#: The forms of the model.
+FORMS = {'contact': _with_contact}
 
 
 def controls(m):

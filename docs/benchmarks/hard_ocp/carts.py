@@ -21,7 +21,6 @@ START, GOAL, WEIGHTS = (-3.0, 0.0, 3.0), (-5.0, 0.0, 5.0), (10.0, 1.0, 10.0)
 LOWEST, HIGHEST = (-15.0, -15.0, -10.0), (10.0, 15.0, 15.0)
 U_MAX, V_MAX = 20.0, 5.0
 U_RANGE, CONTROLS = (-U_MAX, U_MAX), 1
-FORMS = ('contact',)
 #: Time-freezing in nosnoc: the auxiliary force, and the range of the speed of time.
 PUSH, SPEED = 100.0, (1.0, 25.0)
 
@@ -31,8 +30,12 @@ def distance(q, v):
     return sum(weight * (x - goal) ** 2 for weight, x, goal in zip(WEIGHTS, q, GOAL)) + 0.1 * sum(speed**2 for speed in v)
 
 
-def build(form='contact', elements=ELEMENTS, ncp=NCP, **options):
-    """The transformed model; ``options`` are those of ``fesd.finite_elements``."""
+def build(form='contact', **options):
+    """The transformed model in one of ``FORMS``; ``options`` are those of the form and of ``fesd.finite_elements``."""
+    return FORMS[form](**options)
+
+
+def _with_contact(elements=ELEMENTS, ncp=NCP, **options):
     m = pyo.ConcreteModel()
     m.t = dae.ContinuousSet(initialize=grid.ends(HORIZON, STAGES))
     m.i, m.c = pyo.RangeSet(3), pyo.RangeSet(2)
@@ -58,6 +61,10 @@ def build(form='contact', elements=ELEMENTS, ncp=NCP, **options):
 
 def _state(m, t):
     return [m.q[i, t] for i in m.i], [m.v[i, t] for i in m.i]
+
+
+#: The forms of the model.
+FORMS = {'contact': _with_contact}
 
 
 def controls(m):

@@ -24,7 +24,6 @@ MASSES, DRAG, SMALL, REACH = np.array([2.0, 2.0, 1.0, 1.0]), 2.0, 0.1, 0.5
 START, GOAL, WEIGHTS = (-1.0, 0.0, 1.0, 0.0), (1.0, 0.0, -1.0, 0.0), (10.0, 10.0, 20.0, 20.0)
 U_MAX, V_MAX, Q_MAX = 20.0, 5.0, 10.0
 U_RANGE, CONTROLS = (-U_MAX, U_MAX), 2
-FORMS = ('contact', 'time_freezing')
 #: Time-freezing: the auxiliary force, and the range of the speed of time.
 PUSH, SPEED = 10.0, (1.0, 25.0)
 
@@ -55,9 +54,9 @@ def drags(v, sqrt):
     return [DRAG * v[k] / sizes[k // 2] for k in range(4)]
 
 
-def build(form='contact', elements=ELEMENTS, ncp=NCP, **options):
-    """The transformed model; ``options`` are those of ``fesd.finite_elements``."""
-    return {'contact': _with_contact, 'time_freezing': _with_frozen_time}[form](elements, ncp=ncp, **options)
+def build(form='contact', **options):
+    """The transformed model in one of ``FORMS``; ``options`` are those of the form and of ``fesd.finite_elements``."""
+    return FORMS[form](**options)
 
 
 def _bodies():
@@ -84,7 +83,7 @@ def _force(m, i, t):
     return (u[i - 1] if i < 3 else 0) - drags(v, pyo.sqrt)[i - 1]
 
 
-def _with_contact(elements, **options):
+def _with_contact(elements=ELEMENTS, ncp=NCP, **options):
     m = _bodies()
     m.touch = pyomo_fesd.contact(m.t, gap=lambda m, t: gap(_at(m, t)[0]))
     m.way = pyo.Constraint(m.i, m.t, rule=lambda m, i, t: m.dq[i, t] == m.v[i, t])
@@ -95,10 +94,10 @@ def _with_contact(elements, **options):
 
     m.track = dae.Integral(m.t, rule=lambda m, t: running(_at(m, t)[0], _at(m, t)[2]))
     m.cost = pyo.Objective(expr=m.track + final_cost(*_at(m, HORIZON)[:2]))
-    return grid.moving_grid(m, elements, [m.u], **options)
+    return grid.moving_grid(m, elements, [m.u], ncp=ncp, **options)
 
 
-def _with_frozen_time(elements, clock='speed', **options):
+def _with_frozen_time(elements=ELEMENTS, ncp=NCP, clock='speed', **options):
     m = _bodies()
     clocked = grid.clock(m, clock, HORIZON / STAGES, SPEED)
     m.time, m.frozen = pyo.Var(m.t, initialize=lambda m, t: t), pyo.Var(m.t, initialize=0)
@@ -128,7 +127,11 @@ def _with_frozen_time(elements, clock='speed', **options):
     m.track = dae.Integral(m.t, rule=lambda m, t: m.runs[t] * running(_at(m, t)[0], _at(m, t)[2]))
     m.cost = pyo.Objective(expr=m.track + final_cost(*_at(m, HORIZON)[:2]))
     pyo.TransformationFactory('fesd.dcs').apply_to(m)
-    return grid.moving_grid(m, elements, [m.u], **clocked, **options)
+    return grid.moving_grid(m, elements, [m.u], ncp=ncp, **clocked, **options)
+
+
+#: The forms of the model.
+FORMS = {'contact': _with_contact, 'time_freezing': _with_frozen_time}
 
 
 def controls(m):
@@ -177,4 +180,6 @@ def twin():
     }
     reach = np.repeat([Q_MAX, V_MAX], 4)
     costs = {'f_q': speed * running(q_, u_), 'f_terminal': final_cost(q_, v_)}
-    return nosnoc_peer.Twin(given, (-reach, reach, SPEED), costs, {'max_iter_homotopy': 7}, {'max_iter': 1000})
+    return nosnoc_peer.Twin(
+        given, (-reach, reach, SPEED), costs, {'max_iter_homotopy': 7, 'time_freezing_tolerance': 0.0}, {'max_iter': 1000}
+    )

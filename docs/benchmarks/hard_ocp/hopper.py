@@ -30,7 +30,6 @@ LOWEST, HIGHEST, V_MAX = (0.0, 0.0, -pi, 0.1), (0.2 + DISTANCE, 1.5, pi, 0.5), (
 U_MAX = 50.0
 U_RANGE, CONTROLS = (-U_MAX, U_MAX), 2
 WEIGHTS, FINAL, SLOWNESS, EFFORT = (100.0, 100.0, 20.0, 50.0), 300.0, 0.1, 0.01
-FORMS = ('contact', 'time_freezing')
 #: Time-freezing: the auxiliary force, and the range of the speed of time.
 PUSH, SPEED = 100.0, (0.1, 20.0)
 
@@ -72,9 +71,9 @@ def drive(q, u, f):
     return [-f.sin(q[2]) * u[1], f.cos(q[2]) * u[1] - MASSES[1] * G, u[0], u[1]]
 
 
-def build(form='contact', elements=ELEMENTS, ncp=NCP, **options):
-    """The transformed model; ``options`` are those of ``fesd.finite_elements``."""
-    return {'contact': _with_contact, 'time_freezing': _with_frozen_time}[form](elements, ncp=ncp, **options)
+def build(form='contact', **options):
+    """The transformed model in one of ``FORMS``; ``options`` are those of the form and of ``fesd.finite_elements``."""
+    return FORMS[form](**options)
 
 
 def _bodies(guess):
@@ -120,7 +119,7 @@ def _no_slip(m, force):
     m.no_slip = Complementarity(m.t, rule=lambda m, t: complements(force(m, t) >= 0, m.w[t] >= 0))
 
 
-def _with_contact(elements, no_slip=True, guess='start', **options):
+def _with_contact(elements=ELEMENTS, ncp=NCP, no_slip=True, guess='start', **options):
     """``no_slip`` False leaves out the condition on the foot; Coulomb's law remains."""
     m = _bodies(guess)
     m.ground = pyomo_fesd.contact(m.t, gap=lambda m, t: gap(_at(m, t)[0], pyo), friction=FRICTION, slip=_slip)
@@ -137,10 +136,10 @@ def _with_contact(elements, no_slip=True, guess='start', **options):
 
     m.track = dae.Integral(m.t, rule=lambda m, t: running(*_at(m, t), [m.wanted[i, t] for i in m.i]))
     m.cost = pyo.Objective(expr=m.track + final_cost(*_at(m, HORIZON)[:2]))
-    return grid.moving_grid(m, elements, [m.u, m.wanted], **options)
+    return grid.moving_grid(m, elements, [m.u, m.wanted], ncp=ncp, **options)
 
 
-def _with_frozen_time(elements, clock='speed', guess='start', **options):
+def _with_frozen_time(elements=ELEMENTS, ncp=NCP, clock='speed', guess='start', **options):
     m = _bodies(guess)
     clocked = grid.clock(m, clock, HORIZON / STAGES, SPEED)
     m.time = pyo.Var(m.t, initialize=lambda m, t: t)
@@ -176,7 +175,11 @@ def _with_frozen_time(elements, clock='speed', guess='start', **options):
     m.track = dae.Integral(m.t, rule=lambda m, t: m.runs[t] * running(*_at(m, t), [m.wanted[i, t] for i in m.i]))
     m.cost = pyo.Objective(expr=m.track + final_cost(*_at(m, HORIZON)[:2]))
     pyo.TransformationFactory('fesd.dcs').apply_to(m, form='heaviside')
-    return grid.moving_grid(m, elements, [m.u, m.wanted], continuous=[m.w], **clocked, **options)
+    return grid.moving_grid(m, elements, [m.u, m.wanted], continuous=[m.w], ncp=ncp, **clocked, **options)
+
+
+#: The forms of the model.
+FORMS = {'contact': _with_contact, 'time_freezing': _with_frozen_time}
 
 
 def controls(m):

@@ -19,7 +19,6 @@ SETTINGS = {
     'cross_comp_mode': CrossComplementarityMode.COMPLEMENT_ALL_STAGE_VALUES_WITH_EACH_OTHER,
     'step_equilibration': StepEquilibrationMode.HEURISTIC_MEAN,
     'time_freezing': True,
-    'time_freezing_tolerance': 0.0,
 }
 
 

@@ -1,112 +1,67 @@
-"""Hard optimal control problems."""
+"""Hard optimal control problems: pyomo_fesd at its defaults in its forms, beside nosnoc 0.2.0 with the settings of its examples.
+
+    .venv/bin/pip install nosnoc==0.2.0
+    .venv/bin/python docs/benchmarks/hard_ocp/run.py [--only carts,discs] [--methods contact,nosnoc] [--fresh] [--limit 180]
+    .venv/bin/python docs/benchmarks/hard_ocp/run.py --case discs --form contact --seed 0 --options relaxation=scholtes eps_init=10
+
+The first command measures the missing rows, each in a process of its own: seed 0 starts from the model's own values, the others
+from random controls.  It writes rows.csv, one row a run, then summary.csv and summary.png beside this file.  The second solves one
+case and prints one line.
+"""
 
 import argparse
-import importlib
-import json
+import ast
 import os
 import sys
-import time
 from pathlib import Path
 
-# one thread for everybody: CPU seconds are compared
+# CPU seconds are compared: one thread each
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-import numpy as np
-from benchmarks.hard_ocp import replay
+from benchmarks.common.processes import json_lines
+from benchmarks.common.rows import Rows
+from benchmarks.hard_ocp import cases, summary
+
+HERE = Path(__file__).parent
+SEEDS = 5
+KEY = ('problem', 'method', 'seed')
+FOUND = ('status', 'certified', 'objective', 'replayed', 'missed', 'impacts', 'iterations', 'nlps', 'build', 'cpu', 'seconds')
+COLUMNS = (*KEY, *FOUND, 'residual', 'status of replay')
 
 
-def module(case):
-    """The model file of a problem."""
-    return importlib.import_module(f'benchmarks.hard_ocp.{case}')
+def in_process(problem, method, seed, options, limit):
+    """Measure one case in a process of its own; a dict."""
+    given = [f'{name}={value!r}' for name, value in options.items()]
+    arguments = ('--case', problem, '--form', method, '--seed', seed, '--limit', limit, '--options', *given)
+    lines, status = json_lines(__file__, *arguments, limit=cases.WAIT * limit + 60)
+    return lines[-1] if lines else {'problem': problem, 'method': method, 'seed': seed, 'status': died(status, limit)}
 
 
-def guess(p, seed):
-    """Guessed controls of all stages; None, for seed 0, means the model's own."""
-    if seed == 0:
-        return None
-    low, high = p.U_RANGE
-    return 0.1 * np.random.default_rng(seed).uniform(low, high, (p.STAGES, p.CONTROLS))
+def died(status, limit):
+    """Why a process gave no answer; one that is killed at its limit leaves no message."""
+    return f'no answer in {cases.KILL * limit + 30:g} CPU s' if status == 'failed without a message' else status
 
 
-def initialise(p, m, given):
-    """Set the guessed controls."""
-    from benchmarks.hard_ocp import grid
-
-    ends = grid.ends(p.HORIZON, p.STAGES)[1:]
-    for t in m.t:
-        row = given[int(np.searchsorted(ends, t - 1e-9))]
-        parts = [m.u[t]] if p.CONTROLS == 1 else [m.u[j + 1, t] for j in range(p.CONTROLS)]
-        for part, value in zip(parts, row):
-            part.set_value(float(value), skip_validation=True)
-
-
-def replayed(p, used):
-    """Cost of controls in the replay, what they miss, and the number of impacts."""
-    try:
-        out = replay.replay(p.PLANT, p.AT_START, used, np.full(p.STAGES, p.HORIZON / p.STAGES))
-    except RuntimeError as error:
-        return {'replay': str(error)[:80]}
-    return {'replayed': float(out.cost + p.final_cost(out.q, out.v)), 'missed': p.missed(out), 'impacts': len(out.impacts)}
+def study(problems, methods, seeds, limit, fresh):
+    """Measure the missing rows, all methods of a problem and seed one after the other."""
+    rows = Rows(HERE / 'rows.csv', KEY, COLUMNS, fresh=fresh)
+    for seed in range(seeds):
+        for problem in problems:
+            for method in (*cases.module(problem).FORMS, 'nosnoc'):
+                if method in methods and (problem, method, seed) not in rows:
+                    row = in_process(problem, method, seed, {}, limit)
+                    rows.add(row)
+                    show(row)
 
 
-GRID = ('equilibration', 'cross_complementarity', 'ncp', 'rho', 'length_bounds', 'elements', 'clock', 'no_slip', 'guess', 'scheme')
-
-
-def split(options):
-    """Options of the grid, and of the solver."""
-    grid, solver = {}, {}
-    for name, value in options.items():
-        if name in GRID:
-            grid[name] = value
-        elif '.' in name:
-            group, key = name.split('.')
-            solver.setdefault(group, {})[key] = value
-        else:
-            solver[name] = value
-    return grid, solver
-
-
-def with_pyomo_fesd(p, form, seed, options, limit, tee=False):
-    """Build and solve; return the row."""
-    import pyomo.environ as pyo
-
-    import pyomo_fesd  # noqa: F401
-
-    on_grid, on_solver = split(options)
-    started, cpu = time.perf_counter(), time.process_time()
-    m = p.build(form, **on_grid)
-    given = guess(p, seed)
-    if given is not None:
-        initialise(p, m, given)
-    built = time.process_time() - cpu
-    results = pyo.SolverFactory('mpec_hybrid').solve(m, time_limit=limit, tee=tee, load_solutions=True, **on_solver)
-    row = {
-        'status': str(results.solver.termination_condition),
-        'certified': str(results.solver.stationarity) == 'B',
-        'objective': pyo.value(m.cost),
-        'iterations': int(results.solver.nlp_iterations),
-        'nlps': int(results.solver.nlps),
-        'build': built,
-        'cpu': time.process_time() - cpu,
-        'seconds': time.perf_counter() - started,
-    }
-    return row | replayed(p, p.controls(m))
-
-
-def with_nosnoc(p, seed):
-    """Build and solve the twin; return the row."""
-    from benchmarks.hard_ocp import nosnoc_peer
-
-    started = time.perf_counter()
-    row = nosnoc_peer.solve(p, guess(p, seed))
-    return {'seconds': time.perf_counter() - started} | row | replayed(p, row['u'])
+def show(row):
+    """Print a row on one line."""
+    print(' '.join(str(round(v, 5) if isinstance(v, float) else v) for v in row.values()), flush=True)
 
 
 def option(text):
-    """name=value; the value is a Python literal or a string."""
-    import ast
-
+    """'name=value' as a pair; the value is a Python literal or a string."""
     name, _, value = text.partition('=')
     try:
         return name, ast.literal_eval(value)
@@ -114,23 +69,32 @@ def option(text):
         return name, value
 
 
+def names(text):
+    """Names with commas between."""
+    return text.split(',')
+
+
 def main():
+    """Solve one case, or measure the missing rows and write the summary and the picture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--case')
-    parser.add_argument('--form', default='contact')
-    parser.add_argument('--seed', type=int, default=0)
-    parser.add_argument('--options', nargs='*', type=option, default=[])
-    parser.add_argument('--limit', type=float, default=180)
-    parser.add_argument('--tee', action='store_true')
+    parser.add_argument('--only', type=names, default=cases.PROBLEMS, help="problems, by name")
+    parser.add_argument('--methods', type=names, default=tuple(summary.METHODS), help="contact, time_freezing, nosnoc")
+    parser.add_argument('--seeds', type=int, default=SEEDS, help="number of starts")
+    parser.add_argument('--fresh', action='store_true', help="delete the existing rows first")
+    parser.add_argument('--limit', type=float, default=180, help="CPU seconds for each run")
+    parser.add_argument('--summary', action='store_true', help="run nothing")
+    parser.add_argument('--case', help="solve this problem only, and print one line")
+    parser.add_argument('--form', default='contact', help="of the case: contact, time_freezing, or nosnoc")
+    parser.add_argument('--seed', type=int, default=0, help="of the case")
+    parser.add_argument('--options', nargs='*', type=option, default=[], help="of the case: name=value of the solver or the grid")
+    parser.add_argument('--tee', action='store_true', help="print the log of the case")
     chosen = parser.parse_args()
-    p = module(chosen.case)
-    if chosen.form == 'nosnoc':
-        row = with_nosnoc(p, chosen.seed)
-        del row['u']
-        print(json.dumps(row, default=float))
+    if chosen.case:
+        cases.print_case(chosen.case, chosen.form, chosen.seed, dict(chosen.options), chosen.limit, chosen.tee)
         return
-    row = with_pyomo_fesd(p, chosen.form, chosen.seed, dict(chosen.options), chosen.limit, chosen.tee)
-    print(json.dumps(row, default=float))
+    if not chosen.summary:
+        study(chosen.only, chosen.methods, chosen.seeds, chosen.limit, chosen.fresh)
+    summary.write(HERE)
 
 
 if __name__ == '__main__':
