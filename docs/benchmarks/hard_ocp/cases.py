@@ -83,11 +83,10 @@ def split(p, form, options):
     """Options of the model and its grid, and those of the solver."""
     from pyomo_fesd.finite_elements.options import OPTIONS
 
-    rule = p.FORMS[form]
-    own = {name for name, given in inspect.signature(rule).parameters.items() if given.kind is not given.VAR_KEYWORD}
+    own = {*inspect.signature(p.FORMS[form]).parameters, *inspect.signature(grid.moving_grid).parameters, *OPTIONS}
     of_model, of_solver = {}, {}
     for name, value in options.items():
-        if name in own or name in OPTIONS:
+        if name in own:
             of_model[name] = value
         elif '.' in name:
             group, _, inner = name.partition('.')

@@ -1,8 +1,10 @@
 """Control stages and the moving grid that the problems share."""
 
+import numpy as np
 import pyomo.environ as pyo
 
 import pyomo_fesd  # noqa: F401  registers the transformations
+from pyomo_fesd.core import moving_grids
 
 
 def ends(horizon, stages):
@@ -25,9 +27,19 @@ def clock(m, kind, length, speeds):
     return {'stage_lengths': m.stage_length}
 
 
-def moving_grid(m, elements, piecewise_constant, extra=(), **options):
-    """Apply ``fesd.finite_elements`` with ``elements`` elements in each control stage."""
+def moving_grid(m, elements, piecewise_constant, extra=(), lengths='even', **options):
+    """Apply ``fesd.finite_elements`` with ``elements`` elements in each control stage; ``lengths`` are their initial values."""
     number = elements * (len(m.t) - 1)
     options = {'nfe': number, 'piecewise_constant': [*piecewise_constant, *extra]} | options
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, **options)
+    if lengths == 'uneven':
+        _stretch(m, elements)
     return m
+
+
+def _stretch(m, elements):
+    """Every second element of a stage begins with 0.4 of the length of its neighbours."""
+    shares = np.where(np.arange(elements) % 2, 0.4, 1.0)
+    (moving,) = moving_grids(m).values()
+    for n, r in moving.r.items():
+        r.set_value((shares / shares.mean())[(n - 1) % elements])
