@@ -74,6 +74,8 @@ PLANT = replay.Plant(
     restitution=RESTITUTION,
 )
 AT_START = (START, (0.0, 0.0))
+#: Bounds of positions and velocities.
+BOUNDS = (-np.inf, np.inf, np.inf)
 
 
 def missed(outcome):
@@ -108,4 +110,4 @@ def twin():
         'ubg': np.array([U_MAX**2]),
     }
     far = np.full(4, np.inf)
-    return nosnoc_peer.Twin(given, (-far, far, SPEED), costs, ipopt={'max_iter': 1000})
+    return nosnoc_peer.Twin(given, (-far, far, SPEED), costs, {'time_freezing_tolerance': 0.0}, {'max_iter': 1000})

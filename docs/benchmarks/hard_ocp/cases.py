@@ -41,13 +41,21 @@ def initialise(p, m, given):
 
 
 def replayed(p, used):
-    """Cost of controls in the replay, by how much they miss what the problem asks for, and the number of impacts."""
+    """What controls cost in the replay, and by how much they miss what the problem asks for; the bounds of the states are imposed
+    at points of the grid only, and ``excess`` is by how much the path leaves them between."""
     try:
         out = replay.replay(p.PLANT, p.AT_START, used, np.full(p.STAGES, p.HORIZON / p.STAGES))
     except RuntimeError as error:
         return {'status of replay': str(error)[:80]}
     cost = float(out.cost + p.final_cost(out.q, out.v))
-    return {'replayed': cost, 'missed': p.missed(out), 'impacts': len(out.impacts), 'status of replay': 'ok'}
+    asked = {'missed': p.missed(out), 'excess': excess(p, out)}
+    return {'replayed': cost, **asked, 'impacts': len(out.impacts), 'status of replay': 'ok'}
+
+
+def excess(p, out):
+    """By how much a path leaves the bounds."""
+    (low, high, fastest), q, v = p.BOUNDS, np.array(out.positions), np.array(out.velocities)
+    return float(max(0.0, (q - high).max(), (low - q).max(), (np.abs(v) - fastest).max()))
 
 
 def with_pyomo_fesd(p, form, given, options, limit, tee=False):

@@ -26,7 +26,20 @@ from benchmarks.hard_ocp import cases, summary
 HERE = Path(__file__).parent
 SEEDS = 5
 KEY = ('problem', 'method', 'seed')
-FOUND = ('status', 'certified', 'objective', 'replayed', 'missed', 'impacts', 'iterations', 'nlps', 'build', 'cpu', 'seconds')
+FOUND = (
+    'status',
+    'certified',
+    'objective',
+    'replayed',
+    'missed',
+    'excess',
+    'impacts',
+    'iterations',
+    'nlps',
+    'build',
+    'cpu',
+    'seconds',
+)
 COLUMNS = (*KEY, *FOUND, 'residual', 'status of replay')
 
 
