@@ -279,8 +279,9 @@ class Branches:
         if self.tried(zero):
             return None
         key = zero.tobytes()
-        self._attempts[key] += 1
-        last = self._attempts[key] == TRIES
+        # without multipliers and with all iterations a second attempt is no other one
+        self._attempts[key] += TRIES if final and duals is None else 1
+        last = self._attempts[key] >= TRIES
         duals = None if last else duals
         point = self.certified(w, zero, duals=duals, max_iter=SECOND if final or last else FIRST)
         if point is None and final and duals is not None:
@@ -311,15 +312,25 @@ class Branches:
 
     def decided(self, first, zero, apart=False, **more):
         """The second NLP, after the solution ``first`` of a branch, and the decisions in force; none of ``apart``."""
-        c = self._c
-        if first is None or not c.eta.numel():
+        if first is None or not self._c.eta.numel():
             return first, None
-        equal = (c.evaluate(first.w).eta > self._tolerances.eta) & ~np.asarray(apart)
-        second = self._subsolves.branch(first.w, zero, equal, 0.0, duals=first, **more)
-        if second is None and np.any(equal & c.tentative):
-            equal = equal & ~c.tentative
-            second = self._subsolves.branch(first.w, zero, equal, 0.0, duals=first, **more)
-        return second, equal
+        return self._imposed(first.w, zero, ~np.asarray(apart), duals=first, **more)
+
+    def beside(self, w):
+        """The solution of the branch that ``w`` names with the decisions that are in force there, and these; None if it has none.
+
+        ``w`` is exactly complementary, and its decisions hold.
+        """
+        return self._imposed(w, self._subsolves.sets(w, self._tolerances.biactive).zero, True)
+
+    def _imposed(self, w, zero, among, **more):
+        """A branch NLP from ``w`` with the decisions that its eta asks for, ``among`` some; a tentative one only if it can be."""
+        equal = (self._c.evaluate(w).eta > self._tolerances.eta) & among
+        solved = self._subsolves.branch(w, zero, equal, 0.0, **more)
+        if solved is None and np.any(equal & self._c.tentative):
+            equal = equal & ~self._c.tentative
+            solved = self._subsolves.branch(w, zero, equal, 0.0, **more)
+        return solved, equal
 
 
 def _settles(better, point):
