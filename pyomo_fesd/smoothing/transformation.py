@@ -4,7 +4,7 @@ import logging
 
 from pyomo.common.config import Bool, ConfigDict, ConfigValue, NonNegativeFloat, document_class_CONFIG
 from pyomo.common.gc_manager import PauseGC
-from pyomo.core import Transformation, TransformationFactory
+from pyomo.core import Transformation
 from pyomo.core.base.block import BlockData
 from pyomo.core.util import target_list
 from pyomo.dae import ContinuousSet
@@ -36,7 +36,6 @@ def _list_of_components(arg):
     return list(arg) if isinstance(arg, (list, tuple)) else [arg]
 
 
-@TransformationFactory.register(NAME, doc="abs() and its smoothings (IDAES smooth_abs, _max, _min, _bound) to complementarity")
 @document_class_CONFIG(methods=['apply_to', 'create_using'])
 class SmoothToComplementarity(Transformation):
     """Write every absolute value, exact or smoothed, as |z| = 2 s - z, 0 <= s perp s - z >= 0 (theory, eq. 8).
