@@ -6,6 +6,7 @@ Leaves: a block beside the Disjunction for each form and size, with the componen
 """
 
 from collections.abc import Callable
+from functools import cache
 from itertools import chain
 from weakref import ref
 
@@ -45,8 +46,12 @@ def blend(system, form, defined) -> Callable:
     """
     block, index = _form_block(system, form), index_tuple(system.disjunction.index())
 
-    def weight(modes):
+    @cache
+    def weight_of(modes):
         return 1.0 if len(modes) == len(system.modes) else form.weight(block, index, system, modes)
+
+    def weight(modes):
+        return weight_of(tuple(modes))
 
     if form is None:
         _impose_only_mode(block, index, system)
@@ -73,7 +78,7 @@ def _form_block(system, form):
             form.declare(block, sets, form.size(system))
         block.numbers = Set(dimen=1)
         block.mode = Constraint(*sets, block.numbers)
-    for j in range(1, 1 + _number_of_equations(system)):
+    for j in range(1 + len(block.numbers), 1 + _number_of_equations(system)):
         block.numbers.add(j)
     return block
 

@@ -48,7 +48,7 @@ class Mode:
 
     def constraints(self):
         """Return the active constraints: the region and the equations of the mode."""
-        return chain(*(d.component_data_objects(Constraint, active=True, descend_into=Block) for d in self.disjuncts))
+        return chain(*map(active_constraints, self.disjuncts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +71,18 @@ class DisjunctionTree:
     def disjuncts(self):
         """Return all disjuncts, also deactivated ones."""
         return chain(*(d.disjuncts for d in (self.disjunction, *self.nested)))
+
+
+def active_constraints(disjunct) -> list:
+    """Return the active constraints of a disjunct and of the Blocks in it."""
+    found = []
+    for component in disjunct.component_map().values():
+        if component.ctype is Block or (component.ctype is Constraint and component.is_indexed()):
+            return list(disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
+        if component.ctype is Constraint and component.active and len(component):
+            found.append(component)
+    # most disjuncts hold a few scalar Constraints, and there is one at every time: Pyomo's walk takes longer than all the rest
+    return found
 
 
 def enclosing_disjunct(component):
