@@ -1,9 +1,9 @@
 """Find the time in the index of a component: ``unit[a].hyb[0.5].dj['k']`` is split into 0.5 and the rest."""
 
 from collections import defaultdict
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Constraint, Var
 from pyomo.core.base.block import BlockData
 from pyomo.dae import ContinuousSet, DerivativeVar
@@ -60,11 +60,14 @@ class _Place(NamedTuple):
 
     Attributes
     ----------
+    component : IndexedComponent or Block
+        kept, so that no other one gets its id
     outer, inner : time labels of the outermost and of the innermost block over time around it, None without one
     name : with ``*`` in place of the time
     position : of the time in its own index, or None
     """
 
+    component: Any
     outer: float | None
     inner: float | None
     name: str
@@ -83,28 +86,28 @@ class TimeIndex:
 
     def __init__(self, wrt):
         self.wrt = wrt
-        self._places = ComponentMap()
+        self._places = {}
 
     def _place(self, component):
-        place = self._places.get(component)
+        place = self._places.get(id(component))
         if place is None:
-            place = self._places[component] = self._read_place(component)
+            place = self._places[id(component)] = self._read_place(component)
         return place
 
     def _read_place(self, component):
         block = component.parent_block()
         if block is None:
-            return _Place(None, None, '', None)
+            return _Place(component, None, None, '', None)
         name, position = component.local_name, time_position(component, self.wrt)
         if block.parent_block() is None:
-            return _Place(None, None, name, position)
+            return _Place(component, None, None, name, position)
         outer, prefix = self.split(block)
-        return _Place(outer, self.time(block), f'{prefix}.{name}', position)
+        return _Place(component, outer, self.time(block), f'{prefix}.{name}', position)
 
     def split(self, data) -> tuple:
         """Time label of ``data`` (None if it has none) and its name with ``*`` in place of the time."""
         component = data.parent_component()
-        time, _, name, position = self._place(component)
+        _, time, _, name, position = self._place(component)
         if not component.is_indexed():
             return time, name
         index = index_tuple(data.index())
@@ -114,7 +117,7 @@ class TimeIndex:
 
     def time(self, data):
         """Time label of ``data``, or None."""
-        _, inner, _, position = self._place(data.parent_component())
+        _, _, inner, _, position = self._place(data.parent_component())
         return inner if position is None else index_tuple(data.index())[position]
 
     def at(self, data, label):

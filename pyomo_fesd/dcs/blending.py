@@ -12,9 +12,8 @@ from weakref import ref
 
 from pyomo.core import Block, Constraint, Set, Var
 from pyomo.core.base.block import BlockData
-from pyomo.core.expr.visitor import replace_expressions
 
-from pyomo_fesd.core import GENERATED, index_tuple, switched_systems
+from pyomo_fesd.core import GENERATED, exchanged, index_tuple, switched_systems
 from pyomo_fesd.dcs.continuation import Continuation
 from pyomo_fesd.dcs.forms import heaviside
 from pyomo_fesd.dcs.reading import split
@@ -169,10 +168,10 @@ def _keep_sign(copy, v):
 def _continued_body(body, defined, swap, law, i, continuation):
     """The body of an equation of an implicit mode for its copies, so that it has a solution outside of the region too."""
     if law.rest is None:
-        return continuation.law(i, replace_expressions(body, swap), law.domains)
+        return continuation.law(i, exchanged(body, swap), law.domains)
     own, rest = split(body, defined)
     # the exchange removes named expressions, so it comes before weights with hysteresis, which are some
-    return continuation.law(i, replace_expressions(own, swap), law.domains) + continuation.side(i, rest, law.rest)
+    return continuation.law(i, exchanged(own, swap), law.domains) + continuation.side(i, rest, law.rest)
 
 
 def _record_sources(block, replacement, system, sources):

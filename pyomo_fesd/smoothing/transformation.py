@@ -1,6 +1,7 @@
 """``fesd.smooth_to_complementarity``: write |z| and its smoothings exactly (theory, eq. 8)."""
 
 import logging
+from functools import partial
 
 from pyomo.common.config import Bool, ConfigDict, ConfigValue, NonNegativeFloat, document_class_CONFIG
 from pyomo.common.gc_manager import PauseGC
@@ -23,7 +24,7 @@ from pyomo_fesd.core import (
 )
 from pyomo_fesd.smoothing.generated_blocks import add_to_source, last_number, source_of
 from pyomo_fesd.smoothing.linear_terms import LinearCombination
-from pyomo_fesd.smoothing.rewriting import replace_patterns
+from pyomo_fesd.smoothing.rewriting import PatternReplacer
 from pyomo_fesd.smoothing.sources import expressions, set_expressions, sources
 from pyomo_fesd.smoothing.summary import Summary
 from pyomo_fesd.smoothing.survey import Survey
@@ -133,9 +134,9 @@ def _replace_absolute_values(instance, targets, choice):
         survey = Survey(sources(instance, targets), **choice)
         reasons = [(s, [survey.reason(s, *m) for m in matches]) for s, matches in survey.matches.items()]
         _refuse_moving_elements(s for s, found in reasons if None in found)
-        summary = Summary()
+        summary, replacer = Summary(), PatternReplacer()
         for source, found in reasons:
-            _rewrite(source, found, survey.replaced_in(source), summary)
+            _rewrite(source, found, partial(replacer.replace, replaced=survey.replaced_in(source)), summary)
     return summary
 
 
@@ -155,13 +156,13 @@ def _refuse_moving_elements(changing):
                 )
 
 
-def _rewrite(source, reasons, replaced, summary):
+def _rewrite(source, reasons, replace, summary):
     """Rewrite one source, if anything in it is to be replaced."""
     for reason in filter(None, reasons):
         summary.note_left(source, reason)
     if None in reasons:
         parts = _PositiveParts(source)
-        set_expressions(source, [replace_patterns(e, replaced, parts.absolute) for e in expressions(source)])
+        set_expressions(source, [replace(e, absolute=parts.absolute) for e in expressions(source)])
         summary.note_changed(source, reasons.count(None), parts.pairs)
 
 

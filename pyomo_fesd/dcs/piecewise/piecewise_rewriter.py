@@ -13,10 +13,14 @@ Leaves: the components of the rules and the generated constraints; the functions
 Does not apply: where neither the component nor the arguments are over time.
 """
 
+from functools import cache
+
 from pyomo.common.numeric_types import native_types
 from pyomo.contrib.piecewise import PiecewiseLinearExpression, PiecewiseLinearFunction
 from pyomo.core import Block, Constraint, Objective
+from pyomo.core.base.expression import NamedExpressionData
 from pyomo.core.expr import Expr_ifExpression, identify_variables
+from pyomo.core.expr.base import ExpressionBase
 from pyomo.core.expr.visitor import ExpressionReplacementVisitor
 from pyomo.dae import Integral
 from pyomo.gdp import Disjunct, Disjunction
@@ -176,11 +180,25 @@ def _contains(source, wrt):
     waiting = _complementarity_sides(source) if source.ctype is Complementarity else [source.expr]
     while waiting:
         node = waiting.pop()
-        if node.__class__ in RULES:
+        sort = _sort(node.__class__)
+        if sort is _RULE:
             return True
-        if node.__class__ not in native_types and node.is_expression_type() and not _waits(node, wrt):
+        if sort is _OPERATION or (sort is _NAMED and not _waits(node, wrt)):
             waiting.extend(node.args)
     return False
+
+
+_LEAF, _OPERATION, _NAMED, _RULE = range(4)
+
+
+@cache
+def _sort(cls):
+    """How a class of nodes is searched: this is asked for every node of every constraint."""
+    if cls in RULES:
+        return _RULE
+    if not issubclass(cls, ExpressionBase):
+        return _LEAF
+    return _NAMED if issubclass(cls, NamedExpressionData) else _OPERATION
 
 
 def _complementarity_sides(condition):

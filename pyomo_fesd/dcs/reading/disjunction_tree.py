@@ -106,9 +106,9 @@ class Nesting:
 
     def __init__(self, model, times, with_hysteresis=()):
         self._times, self._with_hysteresis = times, with_hysteresis
-        self._inside = ComponentMap()
+        self._inside, self._hosts = ComponentMap(), ComponentMap()
         for disjunction in model.component_data_objects(Disjunction, active=True, descend_into=(Block, Disjunct)):
-            host = self._host(disjunction)
+            host = self._hosts[disjunction] = self._host(disjunction)
             if host is not None:
                 self._inside.setdefault(host, []).append(disjunction)
 
@@ -139,7 +139,7 @@ class Nesting:
         named = ComponentSet(chain(*(t.values() if hasattr(t, 'values') else [t] for t in named)))
         found = []
         for disjunction in disjunctions:
-            host = self._host(disjunction)
+            host = self._hosts[disjunction] if disjunction in self._hosts else self._host(disjunction)
             if host is None and self._times.time(disjunction) is not None:
                 found.append(disjunction)
             elif host is not None and disjunction in named:
