@@ -166,7 +166,9 @@ class _Survey:
 
 
 def _active(component):
-    """The active data of a component."""
+    """The active data of an active component."""
+    if not component.is_indexed():
+        return [component] if len(component) else []
     return [data for data in component.values() if data.active]
 
 
