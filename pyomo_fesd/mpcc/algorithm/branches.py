@@ -95,7 +95,7 @@ class Branches:
             if zero is not None and not self.tried(zero):
                 start = point.w.copy()
                 start[neighbour.starts] = neighbour.at
-                self._widen_from(self.improve_from(self._point(start, zero, None, True), False))
+                self._widen_from(self.improve_from(self._point(start, zero, None, True, below=point.f), False))
                 if self.run.point.f < point.f - PROGRESS * max(1.0, abs(point.f)):
                     neighbours = list(self._c.neighbours)
 
@@ -107,7 +107,7 @@ class Branches:
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for neighbour in self._c.neighbours:
             zero = self._zero_sides(point, neighbour) if neighbour.short.size else None
-            found = None if zero is None else self.certified(point.w, zero, max_iter=SECOND)
+            found = None if zero is None else self.certified(point.w, zero, max_iter=SECOND, below=point.f)
             if _is_below(found, enough):
                 return found
         return None
@@ -271,7 +271,7 @@ class Branches:
         better = self._point(point.w + step.d, step.zero, None, False)
         return better if _is_below(better, enough) else None
 
-    def _point(self, w, zero, duals, final):
+    def _point(self, w, zero, duals, final, **more):
         """The solution of branch ``zero``, certified; None if it has none.
 
         A branch that was solved is not solved again; one that failed is tried once more, without multipliers.
@@ -283,19 +283,19 @@ class Branches:
         self._attempts[key] += TRIES if final and duals is None else 1
         last = self._attempts[key] >= TRIES
         duals = None if last else duals
-        point = self.certified(w, zero, duals=duals, max_iter=SECOND if final or last else FIRST)
+        point = self.certified(w, zero, duals=duals, max_iter=SECOND if final or last else FIRST, **more)
         if point is None and final and duals is not None:
-            point = self.certified(w, zero, duals=None)
+            point = self.certified(w, zero, duals=None, **more)
         if point is not None and point.certificate.grade is not Stationarity.DESCENT:
             self._attempts[key], self._solved[key] = TRIES, point.f
         return point
 
-    def certified(self, w, zero, duals=None, **more):
-        """The certified solution of a branch; None if it has none."""
-        solved, equal = self._solve(w, zero, duals, **more)
+    def certified(self, w, zero, duals=None, below=np.inf, **more):
+        """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one."""
+        solved, equal = self._solve(w, zero, duals, below, **more)
         if solved is not None and not solved.solved and more.get('max_iter') in MORE:
             # feasible, so the branch has a solution, but not at its minimum yet
-            solved, equal = self._solve(solved.w, zero, solved, **more | {'max_iter': MORE[more['max_iter']]})
+            solved, equal = self._solve(solved.w, zero, solved, below, **more | {'max_iter': MORE[more['max_iter']]})
         if solved is None:
             return None
         f = self._c.evaluate(solved.w).f
@@ -306,9 +306,12 @@ class Branches:
         certificate = self._subsolves.certify(solved, equal)
         return Point(solved, f, certificate, equal) if certificate.feasible else None
 
-    def _solve(self, w, zero, duals, **more):
+    def _solve(self, w, zero, duals, below, **more):
         """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force."""
-        return self.decided(self._subsolves.branch(w, zero, None, 1.0, duals=duals, **more), zero, **more)
+        first = self._subsolves.branch(w, zero, None, 1.0, duals=duals, **more)
+        if first is not None and first.solved and self._c.evaluate(first.w).f > below + AS_GOOD * max(1.0, abs(below)):
+            return None, None
+        return self.decided(first, zero, **more)
 
     def decided(self, first, zero, apart=False, **more):
         """The second NLP, after the solution ``first`` of a branch, and the decisions in force; none of ``apart``."""
