@@ -40,7 +40,7 @@ FOUND = (
     'cpu',
     'seconds',
 )
-COLUMNS = (*KEY, *FOUND, 'residual', 'status of replay')
+COLUMNS = (*KEY, 'limit', *FOUND, 'residual', 'status of replay')
 
 
 def in_process(problem, method, seed, options, limit):
@@ -48,7 +48,8 @@ def in_process(problem, method, seed, options, limit):
     given = [f'{name}={value!r}' for name, value in options.items()]
     arguments = ('--case', problem, '--form', method, '--seed', seed, '--limit', limit, '--options', *given)
     lines, status = json_lines(__file__, *arguments, limit=cases.WAIT * limit + 60)
-    return lines[-1] if lines else {'problem': problem, 'method': method, 'seed': seed, 'status': died(status, limit)}
+    row = {'problem': problem, 'method': method, 'seed': seed, 'limit': limit}
+    return row | (lines[-1] if lines else {'status': died(status, limit)})
 
 
 def died(status, limit):
