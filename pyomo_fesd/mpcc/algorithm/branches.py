@@ -48,12 +48,16 @@ class Branches:
         of the homotopy: a point far above the objective that it promises is not worth a descent
     global_lpec : bool
         whether a full LPEC searches beyond the bi-active pairs for a better branch (option ``lpec='full'``)
+    patient : bool
+        whether the first attempt at a branch, too, has the iterations of the second one: where points can be completed, branches
+        are worth more than further relaxations
     """
 
-    def __init__(self, subsolves, gap, global_lpec):
+    def __init__(self, subsolves, gap, global_lpec, patient=False):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
         self._attempts, self._solved, self._exhausted = Counter(), {}, {}
+        self._first = SECOND if patient else FIRST
 
     # called by the algorithm
 
@@ -257,7 +261,7 @@ class Branches:
             if not step.solved or step.descent == 0.0:
                 return None
             reach = radius * np.maximum(1.0, np.abs(w))
-            better = self.certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=FIRST)
+            better = self.certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=self._first)
         return better if _is_below(better, enough) or _settles(better, point) else None
 
     def _beyond(self, point, enough, tolerance, clear):
@@ -283,7 +287,7 @@ class Branches:
         self._attempts[key] += TRIES if final and duals is None else 1
         last = self._attempts[key] >= TRIES
         duals = None if last else duals
-        point = self.certified(w, zero, duals=duals, max_iter=SECOND if final or last else FIRST, **more)
+        point = self.certified(w, zero, duals=duals, max_iter=SECOND if final or last else self._first, **more)
         if point is None and final and duals is not None:
             point = self.certified(w, zero, duals=None, **more)
         if point is not None and point.certificate.grade is not Stationarity.DESCENT:
