@@ -14,7 +14,7 @@ PROBLEMS = ('carts', 'discs', 'hopper', 'ball')
 GUESS = 0.1
 #: A run ends at its limit of CPU seconds; at this multiple of it the process is killed, and a run may wait for a loaded machine
 #: this many times its limit.
-KILL, WAIT = 1.5, 6
+KILL, WAIT = 1.5, 20
 
 
 def module(problem):
