@@ -80,6 +80,7 @@ def with_pyomo_fesd(p, form, given, options, limit, tee=False):
         'status': str(results.solver.termination_condition),
         'certified': str(results.solver.stationarity) == 'B',
         'objective': pyo.value(m.cost),
+        'residual': results.solver.complementarity,
         'iterations': int(results.solver.nlp_iterations),
         'nlps': int(results.solver.nlps),
         'build': built - started,
