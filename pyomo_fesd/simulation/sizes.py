@@ -1,12 +1,12 @@
 """Sizes of the quantities in a simulation, from the equations of a whole element.
 
-Bodies at rest have values that are 0 to round-off, from which no size can be read; what their positions, velocities and forces would
-be without contact forces is in the equations.  With the terms J_ik x_k and the constants b_i of the rows at the start, all values of
-one quantity over time together,
+Bodies at rest have values that are 0 to round-off, from which no size can be read; what their positions, velocities and forces
+would be without contact forces is in the equations.  With the terms J_ik x_k and the constants b_i of the rows at the start, all
+values of one quantity over time together,
 
 * a quantity has its largest known value, or the larger of finite bounds;
 * any other one has s_j = max_i max(b_i, max_k |J_ik| s_k)/|J_ij|, first by rows in which no other one is without a size;
-* a known value far below the change of its quantity over the element is no size.
+* a known value far below the size that the others give to its quantity is no size.
 
 Takes: the equations of an element, and values of its unknowns at the left boundary.
 Leaves: factors, powers of 2; quantities keep the size that they have got first.
@@ -14,6 +14,7 @@ Does not apply: to the length of an element, and to what is between two finite b
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from math import isfinite, log2
 
 from pyomo.core.base.var import VarData
@@ -25,12 +26,33 @@ from pyomo_fesd.simulation.element_equations import ElementEquations
 
 #: Constants below this part of the terms of their row are round-off.
 ROUND_OFF = 1e-12
-#: A known value below this part of the change of its quantity is no size.
+#: A known value below this part of what the other sizes give is no size.
 NEGLIGIBLE = 1e-9
 #: How far the second point is away, relative; its parts of that are multiples of the golden ratio.
 BESIDE, GOLDEN = 0.3, 0.6180339887498949
 #: Sizes beyond these are none.
 LEAST, MOST = 1e-30, 1e30
+
+
+@dataclass(frozen=True)
+class Row:
+    """A linearised equation.
+
+    Attributes
+    ----------
+    constant : float
+        its size; 0 if it is round-off
+    coefficients : dict quantity -> float
+        the largest of each quantity, absolute
+    """
+
+    constant: float = 0.0
+    coefficients: dict = field(default_factory=dict)
+
+    def largest(self, sizes: dict) -> float:
+        """Return the size of the largest term of those with a size."""
+        known = (a * sizes[name] for name, a in self.coefficients.items() if name in sizes)
+        return max([self.constant, *known])
 
 
 class Sizes:
@@ -41,16 +63,17 @@ class Sizes:
 
     def learn(self, equations: ElementEquations, values: Sequence[float]) -> None:
         """Find the sizes of the quantities in ``equations`` that have none yet; ``values`` are those of the unknowns."""
-        known = {}
+        given, known = dict(self._sizes), {}
+        given |= {self._name(v): max(abs(v.lb), abs(v.ub)) for v in equations.unknown if _is_bounded(v)}
         for v in equations.known:
+            sizes = given if self._times.time(v) is None else known
             name = self._name(v)
-            known[name] = max(known.get(name, 0.0), abs(v.value or 0.0))
-        known |= {self._name(v): max(abs(v.lb), abs(v.ub)) for v in equations.unknown if _is_bounded(v)}
+            sizes[name] = max(sizes.get(name, 0.0), abs(v.value or 0.0))
         rows = self._terms(equations, values)
-        found = _spread(rows, known | self._sizes)
-        weak = _negligible(rows, found, known)
-        if weak:
-            found = _spread(rows, {name: size for name, size in known.items() if name not in weak} | self._sizes)
+        dynamic = _spread(rows, given)
+        # beside what the equations say without it, a value that is round-off is no size
+        known = {name: size for name, size in known.items() if size > NEGLIGIBLE * dynamic.get(name, 0.0)}
+        found = _spread(rows, known | given)
         self._sizes = {name: size for name, size in found.items() if LEAST < size < MOST} | self._sizes
 
     def factor(self, v: VarData) -> float | None:
@@ -71,7 +94,7 @@ class Sizes:
         return v.name if label is None else name
 
     def _terms(self, equations, values):
-        """(constant, {quantity: coefficient}) of each row, the larger of two points: the left boundary, and one beside it.
+        """The ``Row`` of each equation, the larger of two points: the left boundary, and one beside it.
 
         At a single point terms may cancel, such as the directions of friction at equal weights.
         """
@@ -96,15 +119,15 @@ class Sizes:
         try:
             slopes = differentiate(body, wrt_list=variables, mode=Modes.reverse_numeric)
         except (ArithmeticError, ValueError, TypeError):
-            return 0.0, {}
-        here, terms, coefficients = value_or_nan(body), [a * (v.value or 0.0) for a, v in zip(slopes, variables)], {}
+            return Row()
+        here, terms, row = value_or_nan(body), [a * (v.value or 0.0) for a, v in zip(slopes, variables)], Row()
         if not all(map(isfinite, (here, *slopes))):
-            return 0.0, {}
+            return row
         for a, v in zip(slopes, variables):
             name = self._name(v)
-            coefficients[name] = max(coefficients.get(name, 0.0), abs(a))
+            row.coefficients[name] = max(row.coefficients.get(name, 0.0), abs(a))
         constant = abs(here - sum(terms))
-        return constant if constant > ROUND_OFF * sum(map(abs, (here, *terms))) else 0.0, coefficients
+        return replace(row, constant=constant) if constant > ROUND_OFF * sum(map(abs, (here, *terms))) else row
 
 
 def _beside(v, part):
@@ -113,8 +136,9 @@ def _beside(v, part):
 
 
 def _larger(one, other):
-    names = {**one[1], **other[1]}
-    return max(one[0], other[0]), {name: max(one[1].get(name, 0.0), other[1].get(name, 0.0)) for name in names}
+    names = {**one.coefficients, **other.coefficients}
+    larger = {name: max(some.coefficients.get(name, 0.0) for some in (one, other)) for name in names}
+    return Row(max(one.constant, other.constant), larger)
 
 
 def _is_bounded(v):
@@ -134,22 +158,9 @@ def _spread(rows, known):
 def _by_rows(rows, sizes, number):
     """Sizes of those without one, by the rows with this ``number`` of such, or by all."""
     found = {}
-    for constant, coefficients in rows:
-        open_ = [name for name, a in coefficients.items() if a > 0 and name not in sizes]
-        largest = max((a * sizes[name] for name, a in coefficients.items() if name in sizes), default=0.0)
-        largest = max(constant, largest)
+    for row in rows:
+        open_ = [name for name, a in row.coefficients.items() if a > 0 and name not in sizes]
+        largest = row.largest(sizes)
         for name in open_ if largest > 0 and number in (None, len(open_)) else ():
-            found[name] = max(found.get(name, 0.0), largest / coefficients[name])
+            found[name] = max(found.get(name, 0.0), largest / row.coefficients[name])
     return found
-
-
-def _negligible(rows, sizes, known):
-    """The quantities with a known value far below the other terms of all their rows."""
-    least = {}
-    for constant, coefficients in rows:
-        for name in coefficients:
-            others = max((a * sizes.get(other, 0.0) for other, a in coefficients.items() if other != name), default=0.0)
-            if coefficients[name] > 0 and name in known:
-                ratio = coefficients[name] * known[name] / max(constant, others) if max(constant, others) > 0 else 1.0
-                least[name] = max(least.get(name, 0.0), ratio)
-    return {name for name, ratio in least.items() if 0 < known[name] and ratio < NEGLIGIBLE}
