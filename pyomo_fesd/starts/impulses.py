@@ -17,10 +17,10 @@ from pyomo_fesd.starts.boundary_values import jump_near
 from pyomo_fesd.starts.element_placement import set_within_bounds
 from pyomo_fesd.starts.time_table import TimeTable
 
-#: An unknown is at a bound if it is nearer than this part of its size.
-AT_BOUND = 1e-8
-#: Tolerance of the least squares, and how far their start is within bounds.
-EXACT, INSIDE = 1e-15, 1e-3
+#: An unknown is at a bound if it is nearer than this part of the largest one.
+AT_BOUND = 1e-6
+#: Tolerances of the least squares, and how far their start is within bounds.
+EXACT, INSIDE = {'xtol': 1e-15, 'ftol': 1e-15, 'gtol': 1e-15}, 1e-3
 
 
 def set_impulses(moving: MovingGrid, times: TimeIndex, table: TimeTable) -> None:
@@ -51,31 +51,37 @@ def _without_impulse(moving, b):
 
 
 def _fit(moving, impacts, b, right):
-    """Impulses of the contacts with the smallest gaps first: those that are closed."""
-    targets = [(after, right[id(v)]) for v, after in moving.state_jumps.velocities_after(b) if id(v) in right]
-    for after, number in targets:
+    """Set impulses and directions so that the velocities after boundary ``b`` are those ``right`` of the jump."""
+    targets = []
+    for v, after in moving.state_jumps.velocities_after(b):
         if after.is_variable_type():
-            set_within_bounds(after, number)
+            set_within_bounds(after, right.get(id(v)))
+        elif id(v) in right:
+            targets.append((after, right[id(v)]))
     unknown = [impacts.impulse[law.name, b] for law in impacts.laws if (law.name, b) in impacts.impulse]
     unknown += list(impacts.directions.get(b, {}).values())
     rows = impacts.between(b)
-    targets = [(after, number) for after, number in targets if not after.is_variable_type()]
 
-    def residuals(x):
-        for v, number in zip(unknown, x):
+    def residuals(variables, x):
+        for v, number in zip(variables, x):
             v.set_value(float(number), skip_validation=True)
         return [value(after) - number for after, number in targets] + [value(row.body) - value(row.upper) for row in rows]
 
-    lower, upper = (np.array([bound if bound is not None else far for bound in bounds]) for bounds, far in _bounds(unknown))
+    lower, upper = _bounds(unknown)
     start = np.clip([v.value or 0.0 for v in unknown], lower + INSIDE, np.maximum(upper - INSIDE, lower + INSIDE))
-    found = least_squares(residuals, start, bounds=(lower, upper), xtol=EXACT, ftol=EXACT, gtol=EXACT, x_scale='jac')
-    size = AT_BOUND * max(1.0, float(np.abs(found.x).max()))
-    at_bound = np.where(found.x - lower < size, lower, np.where(upper - found.x < size, upper, found.x))
-    residuals(at_bound)
+    x = least_squares(lambda x: residuals(unknown, x), start, bounds=(lower, upper), x_scale='jac', **EXACT).x
+    near = AT_BOUND * max(1.0, float(np.abs(x).max()))
+    x = np.where(x - lower < near, lower, np.where(upper - x < near, upper, x))
+    residuals(unknown, x)
+    # those between bounds once more, to round-off
+    inner = [v for v, number, low, high in zip(unknown, x, lower, upper) if low < number < high]
+    if inner:
+        residuals(inner, least_squares(lambda x: residuals(inner, x), [v.value for v in inner], jac='3-point', **EXACT).x)
 
 
-def _bounds(unknown):
-    return (([v.lb for v in unknown], -np.inf), ([v.ub for v in unknown], np.inf))
+def _bounds(variables):
+    low = [-np.inf if v.lb is None else v.lb for v in variables]
+    return np.array(low, dtype=float), np.array([np.inf if v.ub is None else v.ub for v in variables], dtype=float)
 
 
 def set_parts(moving: MovingGrid, times: TimeIndex) -> None:
