@@ -308,31 +308,6 @@ def refused(m, match, **keywords):
     return error.value
 
 
-def test_a_force_that_acts_nowhere_is_refused():
-    m = over_time(1.0, q=1.0, v=0.0)
-    m.table = pyomo_fesd.contact(m.t, gap=lambda m, t: m.q[t])
-    m.kinematics = pyo.Constraint(m.t, rule=lambda m, t: m.dq[t] == m.v[t])
-    m.momentum = pyo.Constraint(m.t, rule=lambda m, t: m.dv[t] == -G)
-    refused(m, r'table\[.*\].normal: contact: no equation contains this force')
-
-
-def test_a_force_in_an_algebraic_equation_is_refused():
-    m = contacts.ball(0)
-    m.power = pyo.Var(m.t)
-    m.define = pyo.Constraint(m.t, rule=lambda m, t: m.power[t] == m.table[t].normal * m.v[t])
-    refused(m, r'define\[.*\]: contact: it contains the force .* but no derivative')
-
-
-def test_a_gap_of_an_algebraic_variable_is_refused():
-    m = over_time(1.0, q=1.0, v=0.0)
-    m.d = pyo.Var(m.t)
-    m.define = pyo.Constraint(m.t, rule=lambda m, t: m.d[t] == m.q[t])
-    m.table = pyomo_fesd.contact(m.t, gap=lambda m, t: m.d[t])
-    m.kinematics = pyo.Constraint(m.t, rule=lambda m, t: m.dq[t] == m.v[t])
-    m.momentum = pyo.Constraint(m.t, rule=lambda m, t: m.dv[t] == -G + m.table[t].normal)
-    refused(m, r"its gap contains 'd\[.*\]', which is algebraic")
-
-
 def test_a_velocity_that_is_reset_too_is_refused():
     m = contacts.ball(0)
     m.jump = pyomo_fesd.state_jump(m.t, guard=lambda m, t: 2 - m.q[t], reset=lambda m, t: [(m.v[t], 0)])
@@ -341,9 +316,3 @@ def test_a_velocity_that_is_reset_too_is_refused():
 
 def test_bodies_that_collide_at_the_first_time_are_refused():
     refused(contacts.ball(0, height=0.0, speed=-1.0), 'the gap is closed at the first time and closes at a rate of 1')
-
-
-def test_a_rate_that_no_single_equation_gives_is_refused():
-    m = contacts.ball(0)
-    m.again = pyo.Constraint(m.t, rule=lambda m, t: m.dq[t] - m.v[t] == m.q[t] - m.q[t])
-    refused(m, r"the gap depends on 'q\[.*\]', and 2 equation")
