@@ -124,7 +124,8 @@ class MpecHybrid(CasadiSolver):
                     compiled = record.compiled = ready.compiled
                     table.begin(compiled)
                     shared = compiled, config, config.timer, ready.deadline, ready.cache
-                    setup = Setup(*shared, table.row, reporter(config.callback, compiled, started), start.further(compiled))
+                    followed = table.row, reporter(config.callback, compiled, started)
+                    setup = Setup(*shared, *followed, start.further(compiled), start.completion(compiled))
                     solver = (Multistart if config.starts > 1 else HybridSolver)(setup)
                     record.run = solver.run
                     fill_results(results, model, solver.solve(), set_indicators, compiled, names=user_names)
