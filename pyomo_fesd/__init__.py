@@ -12,6 +12,7 @@ from pyomo_fesd import smoothing as _smoothing  # noqa: F401
 from pyomo_fesd import units
 from pyomo_fesd.analysis import report, structure
 from pyomo_fesd.core import FesdError, __version__
+from pyomo_fesd.finite_elements import recollocate
 from pyomo_fesd.modeling import (
     absolute,
     clip,
@@ -46,6 +47,7 @@ __all__ = [
     'plot',
     'positive_part',
     'projection',
+    'recollocate',
     'refine',
     'report',
     'signal',

@@ -83,6 +83,7 @@ def test_public_names():
         'plot',
         'positive_part',
         'projection',
+        'recollocate',
         'refine',
         'report',
         'signal',
