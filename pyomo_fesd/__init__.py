@@ -10,7 +10,7 @@ from pyomo_fesd import dcs as _dcs  # noqa: F401
 from pyomo_fesd import finite_elements as _finite_elements  # noqa: F401
 from pyomo_fesd import smoothing as _smoothing  # noqa: F401
 from pyomo_fesd import units
-from pyomo_fesd.analysis import report, structure
+from pyomo_fesd.analysis import branch_equations, report, structure
 from pyomo_fesd.core import FesdError, __version__
 from pyomo_fesd.finite_elements import recollocate
 from pyomo_fesd.modeling import (
@@ -35,6 +35,7 @@ from pyomo_fesd.starts import start_from
 __all__ = [
     'FesdError',
     'absolute',
+    'branch_equations',
     'certify',
     'clip',
     'clock',

@@ -71,6 +71,7 @@ def test_public_names():
     assert sorted(pyomo_fesd.__all__) == [
         'FesdError',
         'absolute',
+        'branch_equations',
         'certify',
         'clip',
         'clock',
