@@ -29,13 +29,14 @@ from pyomo_fesd.modeling import (
 from pyomo_fesd.refinement import refine
 from pyomo_fesd.results import element_lengths, physical_time, plot, switches, trajectory
 from pyomo_fesd.simulation import simulate
-from pyomo_fesd.solvers import certify
+from pyomo_fesd.solvers import casadi_ipopt, certify
 from pyomo_fesd.starts import start_from
 
 __all__ = [
     'FesdError',
     'absolute',
     'branch_equations',
+    'casadi_ipopt',
     'certify',
     'clip',
     'clock',

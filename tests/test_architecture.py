@@ -72,6 +72,7 @@ def test_public_names():
         'FesdError',
         'absolute',
         'branch_equations',
+        'casadi_ipopt',
         'certify',
         'clip',
         'clock',
