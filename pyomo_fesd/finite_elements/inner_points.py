@@ -1,7 +1,7 @@
 """What components have at new points inside elements: from the ends of the element.
 
     value       linear between the ends for what is free or a state, that of the right end for what is fixed and for derivatives
-    fixed, active, bounds, scaling factors, left out by the user        as at the right end
+    fixed, active, bounds, scaling factors, left out by the user, multiplied by IDAES        as at the right end
 
 Takes: a model before it gets the points, and then with them.
 Leaves: values, flags, bounds and Suffix entries at the new points.
@@ -23,6 +23,8 @@ from pyomo_fesd.core import TimeIndex, derivatives, is_discretisation_equation, 
 logger = logging.getLogger('pyomo_fesd')
 
 PLACES = (Block, Disjunct)
+#: The Suffix in which IDAES keeps the factors that it has multiplied equations with.
+SCALED_IN_PLACE = 'constraint_transformed_scaling_factor'
 #: Names that one message lists.
 SHOWN = 3
 
@@ -44,6 +46,7 @@ class InnerPoints:
         self._copy_activity()
         self._give_values()
         self._copy_suffixes()
+        self._scale_equations()
 
     def _ends(self, label):
         """The boundaries left and right of a new label."""
@@ -127,6 +130,21 @@ class InnerPoints:
             for data, entry in list(self._entries(suffix)):
                 suffix[data] = entry
 
+    def _scale_equations(self):
+        """Multiply equations by the factor that IDAES has put into those at the right ends; all of pyomo.dae's own are new."""
+        old = set(self._old)
+        for suffix in self._model.component_data_objects(Suffix, descend_into=PLACES):
+            if suffix.local_name == SCALED_IN_PLACE:
+                for c, factor in suffix.items():
+                    label = self._times.time(c)
+                    if label is not None and (label not in old or self._is_rewritten(c)):
+                        _multiply(c, factor)
+
+    def _is_rewritten(self, c):
+        name = c.parent_component().local_name
+        rate = c.parent_block().component(name.removesuffix('_disc_eq')) if is_discretisation_equation(c) else None
+        return rate is not None and rate in self._rates
+
     def _entries(self, suffix):
         """New data with the entries of the right ends of their elements."""
         inside = {}
@@ -142,6 +160,14 @@ class InnerPoints:
                     continue
                 if new is not None and new not in suffix:
                     yield new, entry
+
+
+def _multiply(c, factor):
+    """Scale a constraint in place."""
+    if c.equality:
+        c.set_value(c.body * factor == c.upper * factor)
+    else:
+        c.set_value(tuple(None if part is None else part * factor for part in (c.lower, c.body, c.upper)))
 
 
 def _differ(a, b):

@@ -87,6 +87,23 @@ def test_inputs_with_several_values_are_held_over_their_elements_and_this_is_sai
     assert 'held in each element' in caplog.text and caplog.text.rstrip().endswith('u[*]')
 
 
+def test_equations_that_idaes_scaled_in_place_are_scaled_at_all_points(caplog):
+    m = decay(switched=True)
+    m.constraint_transformed_scaling_factor = pyo.Suffix()
+    for c in (*m.equal.values(), *m.dx_disc_eq.values()):
+        c.set_value(c.body * 100 == c.upper * 100)
+        m.constraint_transformed_scaling_factor[c] = 100
+    pyomo_fesd.recollocate(m, ncp=2)
+    for v in m.component_data_objects(pyo.Var):
+        if not v.fixed:
+            v.set_value(0.25)
+    for family in (m.equal, m.dx_disc_eq):
+        assert all(c in m.constraint_transformed_scaling_factor for c in family.values())
+        assert {len(str(c.expr).split('100')) > 1 for c in family.values()} == {True}
+    move(m)
+    assert 'its numbers depend on the time label' not in caplog.text
+
+
 def test_discretised_first_and_switched_later_the_switch_is_exact():
     m = decay(switched=True)
     pyomo_fesd.recollocate(m, ncp=2)
@@ -97,6 +114,11 @@ def test_discretised_first_and_switched_later_the_switch_is_exact():
     assert switch.time == pytest.approx(0.5, abs=1e-9)
     solve(m, warm_start=True)
     assert m.x[END].value == pytest.approx(0.5 - 0.25 * 1.5, abs=1e-9)
+
+
+def move(m, **keywords):
+    pyo.TransformationFactory('fesd.dcs').apply_to(m)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, **keywords)
 
 
 REFUSED = {
@@ -144,11 +166,6 @@ def test_a_rule_that_fails_at_a_new_time_leaves_the_model_as_it_was():
     with pytest.raises(pyomo_fesd.FesdError, match="a rule failed at a new time"):
         pyomo_fesd.recollocate(m)
     assert seen(m) == before and m.dx.get_derivative_expression() is expression
-
-
-def move(m, **keywords):
-    pyo.TransformationFactory('fesd.dcs').apply_to(m)
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, **keywords)
 
 
 def test_elements_of_order_one_that_find_switches_are_named_with_the_line_that_cures_it(caplog):
