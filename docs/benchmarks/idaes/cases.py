@@ -1,7 +1,7 @@
 """Dynamic models from idaes-pse's own tests and examples, each with one switch added.
 
-``build()`` runs the script as published; ``switch(m)`` holds the lines that are added, ``plain(m)`` the same law without a switch,
-with which a fixed grid is integrated up to the first zero of ``guard(m, t)``: the reference.
+``build(nfe)`` runs the script as published; ``switch(m)`` holds the lines that are added.  The reference is the published
+model, on a fixed fine grid, up to the first zero of ``guard(m, t)``.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ class Case:
     switch : callable, the lines that are added
     guard : callable (model, t) -> expression, zero at the switch, of states
     wrt : callable model -> ContinuousSet
-    nfe : int, as published
+    grids : tuple of int, numbers of elements; the first as published, or the coarsest that IDAES' own tests use
     fine : int, elements of the reference
     """
 
@@ -31,9 +31,8 @@ class Case:
     switch: Callable
     guard: Callable
     wrt: Callable
-    nfe: int
+    grids: tuple
     fine: int
-    plain: Callable = lambda m: None
 
 
 # Chemical Akzo Nobel problem, of IDAES' own tests of PETSc: the feed is shut where y1 has fallen to 0.3
@@ -108,8 +107,8 @@ CASES = {
         shut_the_feed,
         lambda m, t: m.y[t, 1] - 0.3,
         lambda m: m.t,
-        nfe=20,
-        fine=160,
+        grids=(20, 40, 80),
+        fine=320,
     ),
     'NMPC CSTR': Case(
         'idaes/apps/caprese/examples/cstr_model.py: make_model',
@@ -117,7 +116,7 @@ CASES = {
         shut_the_substrate,
         lambda m, t: m.fs.cstr.control_volume.material_holdup[t, 'aq', 'P'] - 0.4,
         lambda m: m.fs.time,
-        nfe=20,
+        grids=(10, 20),
         fine=60,
     ),
     'TGA': Case(
@@ -126,7 +125,7 @@ CASES = {
         leaner_gas,
         lambda m, t: m.fs.TGA.solids_material_holdup[t, 'Fe2O3'] - 0.5 * m.fs.TGA.solids_material_holdup[0, 'Fe2O3'],
         lambda m: m.fs.time,
-        nfe=100,
+        grids=(100,),
         fine=100,
     ),
 }
