@@ -22,7 +22,7 @@ from pyomo_fesd.core.evaluation import (
     value_or_zero,
     variables_that_count,
 )
-from pyomo_fesd.core.expression_key import Swap, component_key, expression_key, prefix_tokens
+from pyomo_fesd.core.expression_key import Swap, component_key, exchanged, expression_key, prefix_tokens
 from pyomo_fesd.core.generated import GENERATED, is_generated, public_name, source_name
 from pyomo_fesd.core.gradient import gradient
 from pyomo_fesd.core.grid import (
