@@ -14,8 +14,9 @@ from pyomo.core import TransformationFactory
 
 if TYPE_CHECKING:  # the same names as in _ROOMS, for editors and type checkers
     from pyomo_fesd import units
-    from pyomo_fesd.analysis import report, structure
+    from pyomo_fesd.analysis import branch_equations, report, structure
     from pyomo_fesd.core import FesdError, __version__
+    from pyomo_fesd.finite_elements import recollocate
     from pyomo_fesd.modeling import (
         absolute,
         clip,
@@ -32,12 +33,14 @@ if TYPE_CHECKING:  # the same names as in _ROOMS, for editors and type checkers
     from pyomo_fesd.refinement import refine
     from pyomo_fesd.results import element_lengths, physical_time, plot, switches, trajectory
     from pyomo_fesd.simulation import simulate
-    from pyomo_fesd.solvers import certify
+    from pyomo_fesd.solvers import casadi_ipopt, certify
     from pyomo_fesd.starts import start_from
 
 __all__ = [
     'FesdError',
     'absolute',
+    'branch_equations',
+    'casadi_ipopt',
     'certify',
     'clip',
     'clock',
@@ -50,6 +53,7 @@ __all__ = [
     'plot',
     'positive_part',
     'projection',
+    'recollocate',
     'refine',
     'report',
     'signal',
@@ -64,8 +68,9 @@ __all__ = [
 
 #: Room -> the public names that it defines.
 _ROOMS = {
-    'analysis': ('report', 'structure'),
+    'analysis': ('branch_equations', 'report', 'structure'),
     'core': ('FesdError', '__version__'),
+    'finite_elements': ('recollocate',),
     'modeling': (
         *('absolute', 'clip', 'clock', 'contact', 'friction', 'maximum', 'minimum', 'positive_part', 'projection', 'signal'),
         'state_jump',
@@ -73,7 +78,7 @@ _ROOMS = {
     'refinement': ('refine',),
     'results': ('element_lengths', 'physical_time', 'plot', 'switches', 'trajectory'),
     'simulation': ('simulate',),
-    'solvers': ('certify',),
+    'solvers': ('casadi_ipopt', 'certify'),
     'starts': ('start_from',),
 }
 _HOMES = {name: room for room, names in _ROOMS.items() for name in names}

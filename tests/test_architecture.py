@@ -71,6 +71,8 @@ def test_public_names():
     assert sorted(pyomo_fesd.__all__) == [
         'FesdError',
         'absolute',
+        'branch_equations',
+        'casadi_ipopt',
         'certify',
         'clip',
         'clock',
@@ -83,6 +85,7 @@ def test_public_names():
         'plot',
         'positive_part',
         'projection',
+        'recollocate',
         'refine',
         'report',
         'signal',

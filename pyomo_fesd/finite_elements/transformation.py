@@ -49,6 +49,7 @@ from pyomo_fesd.finite_elements.mode_limits import with_mode_limits
 from pyomo_fesd.finite_elements.neighbour_branches import add_neighbour_branches
 from pyomo_fesd.finite_elements.options import RENAMED, declare_options
 from pyomo_fesd.finite_elements.quadrature import integrands, rebuild
+from pyomo_fesd.finite_elements.recollocation import warn_of_order_one
 from pyomo_fesd.finite_elements.right_limits import RightLimits
 from pyomo_fesd.finite_elements.sliding_exit import add_sliding_exits
 from pyomo_fesd.finite_elements.spatial_sets import refuse_waiting_space
@@ -119,9 +120,12 @@ class FiniteElements(Transformation):
         instance = _common_block(instance, wrt)
         _check_keywords(instance, wrt, config)
         with TRANSFORMATION, restored_on_error(instance, wrt), PauseGC():
+            present = discretised(wrt)
             moving = _add_grid(instance, wrt, config)
             integrals = _rebuild_integrals(instance, moving)
             switching = _read_switching(instance, wrt, config)
+            if present and switching:
+                warn_of_order_one(moving)
             _warn(expressions_over_time(instance, moving, integrals, switching.laws()), moving)
             continuity = _read_continuity(instance, moving, switching, config)
             complementarities = _read_complementarities(moving, switching, continuity)
