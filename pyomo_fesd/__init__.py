@@ -27,6 +27,7 @@ from pyomo_fesd.modeling import (
 )
 from pyomo_fesd.refinement import refine
 from pyomo_fesd.results import element_lengths, physical_time, plot, switches, trajectory
+from pyomo_fesd.sensitivities import sensitivity
 from pyomo_fesd.simulation import simulate
 from pyomo_fesd.solvers import certify
 from pyomo_fesd.starts import start_from
@@ -48,6 +49,7 @@ __all__ = [
     'projection',
     'refine',
     'report',
+    'sensitivity',
     'signal',
     'simulate',
     'start_from',

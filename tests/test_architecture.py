@@ -16,7 +16,7 @@ FLOORS = (
     ('diagnostics',),
     ('solvers',),
     ('simulation',),
-    ('starts',),
+    ('starts', 'sensitivities'),
     ('refinement',),
 )
 #: The rooms inside a room, each importing only from those before it.
@@ -85,6 +85,7 @@ def test_public_names():
         'projection',
         'refine',
         'report',
+        'sensitivity',
         'signal',
         'simulate',
         'start_from',

@@ -135,6 +135,16 @@ class MovingGrid(AutoSlots.Mixin):
         """Return h_n as an expression, in time of the plant."""
         return element.length * self.speed(element)
 
+    def time_expression(self, label: float):
+        """Return the physical time of a label (eq. 9 and 10) as an expression of the element lengths."""
+        time = float(self.wrt.first())
+        for element in self.grid.elements:
+            if label <= element.left:
+                break
+            inside = label < element.right
+            time += self.duration(element) * (self.grid.tau[element.points.index(label)] if inside else 1.0)
+        return time
+
     def physical_time(self) -> dict[float, float]:
         """Return the physical time of every label (eq. 9 and 10), in order of time."""
         first = self.wrt.first()
