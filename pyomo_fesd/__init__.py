@@ -12,6 +12,7 @@ from pyomo_fesd import smoothing as _smoothing  # noqa: F401
 from pyomo_fesd import units
 from pyomo_fesd.analysis import report, structure
 from pyomo_fesd.core import FesdError, __version__
+from pyomo_fesd.estimation import at
 from pyomo_fesd.modeling import (
     absolute,
     clip,
@@ -27,7 +28,7 @@ from pyomo_fesd.modeling import (
 )
 from pyomo_fesd.refinement import refine
 from pyomo_fesd.results import element_lengths, physical_time, plot, switches, trajectory
-from pyomo_fesd.sensitivities import sensitivity
+from pyomo_fesd.sensitivities import covariance, sensitivity
 from pyomo_fesd.simulation import simulate
 from pyomo_fesd.solvers import certify
 from pyomo_fesd.starts import start_from
@@ -35,10 +36,12 @@ from pyomo_fesd.starts import start_from
 __all__ = [
     'FesdError',
     'absolute',
+    'at',
     'certify',
     'clip',
     'clock',
     'contact',
+    'covariance',
     'element_lengths',
     'friction',
     'maximum',

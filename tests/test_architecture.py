@@ -12,7 +12,7 @@ PACKAGE = Path(pyomo_fesd.__file__).parent
 FLOORS = (
     ('core',),
     ('modeling', 'units', 'smoothing', 'dcs', 'finite_elements', 'mpcc'),
-    ('results', 'analysis'),
+    ('results', 'analysis', 'estimation'),
     ('diagnostics',),
     ('solvers',),
     ('simulation',),
@@ -71,10 +71,12 @@ def test_public_names():
     assert sorted(pyomo_fesd.__all__) == [
         'FesdError',
         'absolute',
+        'at',
         'certify',
         'clip',
         'clock',
         'contact',
+        'covariance',
         'element_lengths',
         'friction',
         'maximum',

@@ -1,6 +1,6 @@
 """The record of a moving grid: elements whose lengths are variables, and what ``fesd.finite_elements`` put on them.
 
-Written by ``fesd.finite_elements``; read by simulation, refinement, diagnostics and results.
+Written by ``fesd.finite_elements`` (the instants by ``at``); read by simulation, refinement, diagnostics and results.
 """
 
 from collections.abc import Iterator
@@ -74,6 +74,8 @@ class MovingGrid(AutoSlots.Mixin):
         the pairs of step equilibration, by element
     state_jumps : StateJumps or None
     hysteresis : Hysteresis or None
+    instants : dict
+        physical time (or the expression of one that is not given) -> ``Instant``
     """
 
     __slots__ = (
@@ -97,13 +99,14 @@ class MovingGrid(AutoSlots.Mixin):
         'equilibration',
         'state_jumps',
         'hysteresis',
+        'instants',
     )
 
     def __init__(self, wrt: ContinuousSet, block: Block, grid: Grid):
         for name in self.__slots__:
             setattr(self, name, None)
         self.wrt, self.block, self.grid = wrt, block, grid
-        self.complementarities = []
+        self.complementarities, self.instants = [], {}
         self.sources, self.splits, self.split_sources = ComponentMap(), ComponentMap(), ComponentMap()
 
     def source(self, condition):

@@ -84,7 +84,7 @@ class BranchSystem:
         forward = self._forward(np.asarray(b), d)
         step = fixed.copy()
         step[free] = forward.x
-        self._refuse_open(step)
+        self._refuse_open(step, self._open[1], self._parameters)
         adjoint = self._adjoint(by_w[:, free].T, names)
         through, sizes = by_w[:, free] @ forward.x, np.maximum(1.0, np.abs(by_w[:, free]) @ np.abs(forward.x))
         self._refuse_inexact(through, np.asarray(adjoint.x.T @ b + adjoint.y.T @ d), sizes, names)
@@ -118,16 +118,33 @@ class BranchSystem:
             "give the model as many equations as unknowns, an objective with one minimum, or step equilibration",
         )
 
-    def _refuse_open(self, step):
-        """Refuse open rows that do not stay as they are; those that do hold in every branch."""
-        A, D = self._open
+    def inverse(self, by_w, names):
+        """W P W' for quantities with gradients W (k, n), P the inverse of the Hessian that is reduced to the active rows.
+
+        Raises
+        ------
+        FesdError
+            as ``derivatives``
+        """
+        answer = self._adjoint(by_w[:, self._free].T, names)
+        step = np.zeros((by_w.shape[1], by_w.shape[0]))
+        step[self._free] = answer.x
+        self._refuse_open(step, 0.0, names)
+        return by_w @ step
+
+    def _refuse_open(self, step, D, causes):
+        """Refuse open rows that do not stay as they are; those that do hold in every branch.
+
+        ``step`` has a column for each of the ``causes``, ``D`` what these add to the rows.
+        """
+        A, _ = self._open
         moves = np.abs(A @ step + D)
         most = MOVES * np.maximum(1.0, np.abs(A) @ np.abs(step) + np.abs(D))
         if np.all(moves <= most):
             return
         i, j = np.unravel_index(np.argmax(moves - most), moves.shape)
         raise FesdError(
-            self._parameters[j],
+            causes[j],
             f"the solution has a kink there: '{self._open_names[i]}' is active without a positive multiplier (strict "
             "complementarity is lost), so derivatives to both sides differ",
             BESIDE,
