@@ -12,7 +12,7 @@ from pyomo_fesd import smoothing as _smoothing  # noqa: F401
 from pyomo_fesd import units
 from pyomo_fesd.analysis import report, structure
 from pyomo_fesd.core import FesdError, __version__
-from pyomo_fesd.estimation import at
+from pyomo_fesd.estimation import at, parmest_solver
 from pyomo_fesd.modeling import (
     absolute,
     clip,
@@ -46,6 +46,7 @@ __all__ = [
     'friction',
     'maximum',
     'minimum',
+    'parmest_solver',
     'physical_time',
     'plot',
     'positive_part',

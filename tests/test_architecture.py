@@ -81,6 +81,7 @@ def test_public_names():
         'friction',
         'maximum',
         'minimum',
+        'parmest_solver',
         'physical_time',
         'plot',
         'positive_part',
