@@ -31,6 +31,7 @@ from pyomo_fesd.core.homotopy_hints import (
     BranchConstraint,
     Change,
     Coincidence,
+    Filling,
     Follower,
     HomotopyHints,
     NeighbourBranch,

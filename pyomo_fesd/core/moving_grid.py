@@ -75,7 +75,7 @@ class MovingGrid(AutoSlots.Mixin):
     state_jumps : StateJumps or None
     hysteresis : Hysteresis or None
     instants : dict
-        physical time (or the expression of one that is not given) -> ``Instant``
+        physical time -> ``Instant``
     """
 
     __slots__ = (

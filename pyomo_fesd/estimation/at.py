@@ -9,7 +9,7 @@ from pyomo_fesd.core import FesdError, MovingGrid, derivatives, index_sets, inte
 from pyomo_fesd.estimation.instants import instant
 
 
-def at(variable, time):
+def at(variable, time: float):
     """Return the value of a state at a physical time, as an expression for objectives and constraints.
 
     In element n, at the place 0 <= s <= 1, collocation gives the polynomial X_n(s) through the values at the left boundary and at
@@ -25,13 +25,13 @@ def at(variable, time):
     ----------
     variable : Var over one ContinuousSet, or a slice of a Var, such as ``m.x[:, 'A']``
         a state without state jumps; a function of states is written with ``at`` of each
-    time : number, or expression of Params and variables
+    time : float
 
     Raises
     ------
     FesdError
-        for a variable that is not a state over time alone, for a state that jumps, before the discretisation, and for a time
-        outside of the horizon
+        for a variable that is not a state over time alone, for a state that jumps, before the discretisation, with a free final
+        time, and for a time outside of the horizon
     """
     variable = Reference(variable) if isinstance(variable, IndexedComponent_slice) else variable
     moving = _grid(variable)

@@ -85,18 +85,6 @@ def test_derivatives_by_the_lengths_are_exact():
     assert pyomo_fesd.sensitivity(m, [m.surface, m.slope], values).to_numpy() == pytest.approx(exact, abs=1e-8)
 
 
-def test_a_time_that_changes():
-    m = ramp()
-    m.when = pyo.Param(initialize=0.5, mutable=True)
-    value = at(m.x, m.when)
-    pyo.SolverFactory('mpec_hybrid').solve(m)
-    assert pyo.value(value) == pytest.approx(-0.5, abs=1e-8)
-    assert pyomo_fesd.sensitivity(m, m.when, value).iloc[0, 0] == pytest.approx(3.0, abs=1e-7)
-    m.when.set_value(1.0)
-    pyo.SolverFactory('mpec_hybrid').solve(m)
-    assert pyo.value(value) == pytest.approx(1 / 3, abs=1e-8)
-
-
 def test_simulate_sets_the_shares_and_clones_have_their_own():
     m = ramp()
     m.y = pyo.Var(initialize=0.0)
@@ -129,6 +117,8 @@ def test_refuses_what_it_cannot_evaluate():
         (m.slope, 0.5, 'not a Var over one'),
         (m.x, 2.5, 'outside of'),
         (m.x, -0.5, 'outside of'),
+        (m.x, m.slope, 'not a number'),
+        (m.x, float('nan'), 'not a number'),
     ):
         with pytest.raises(FesdError, match=message):
             at(variable, time)
