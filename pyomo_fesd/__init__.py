@@ -28,6 +28,7 @@ from pyomo_fesd.modeling import (
 )
 from pyomo_fesd.refinement import refine
 from pyomo_fesd.results import element_lengths, physical_time, plot, switches, trajectory
+from pyomo_fesd.scenarios import sweep
 from pyomo_fesd.sensitivities import covariance, sensitivity
 from pyomo_fesd.simulation import simulate
 from pyomo_fesd.solvers import certify
@@ -59,6 +60,7 @@ __all__ = [
     'start_from',
     'state_jump',
     'structure',
+    'sweep',
     'switches',
     'trajectory',
     'units',

@@ -16,7 +16,7 @@ FLOORS = (
     ('diagnostics',),
     ('solvers',),
     ('simulation',),
-    ('starts', 'sensitivities'),
+    ('starts', 'sensitivities', 'scenarios'),
     ('refinement',),
 )
 #: The rooms inside a room, each importing only from those before it.
@@ -94,6 +94,7 @@ def test_public_names():
         'start_from',
         'state_jump',
         'structure',
+        'sweep',
         'switches',
         'trajectory',
         'units',

@@ -9,6 +9,7 @@ diagnostics, models that are not discretised.
 
 from pyomo_fesd.solvers import casadi_ipopt
 from pyomo_fesd.solvers.mpec_hybrid import certified_model, certify
+from pyomo_fesd.solvers.options import MpecHybridConfig
 from pyomo_fesd.solvers.simulated_start import register_simulation
 from pyomo_fesd.solvers.unready_models import refuse_unready
 from pyomo_fesd.solvers.user_names import user_names
