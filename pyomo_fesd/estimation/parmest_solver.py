@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from pyomo.contrib.parmest import parmest
 from pyomo.opt import SolverFactory
 
 from pyomo_fesd.core import FesdError
@@ -31,6 +30,9 @@ def parmest_solver(name: str = 'mpec_hybrid', **options) -> Iterator[None]:
     FesdError
         for a solver that Pyomo does not know
     """
+    # parmest takes longer to import than the rest of this room, which states at a time do not need
+    from pyomo.contrib.parmest import parmest
+
     if not SolverFactory(name).available(exception_flag=False):
         raise FesdError(f"parmest_solver('{name}')", "Pyomo does not find this solver", "take 'mpec_hybrid' or 'casadi_ipopt'")
     factory = parmest.SolverFactory
