@@ -45,14 +45,19 @@ def switches(model: Block, wrt: ContinuousSet | None = None) -> Switches:
         list of ``Switch(time, disjunction, before, after)``
     """
     wrt = find_continuous_set(model, wrt, 'switches')
+    return Switches(switch for _, switch in labelled_switches(model, wrt))
+
+
+def labelled_switches(model: Block, wrt: ContinuousSet) -> list[tuple[float, Switch]]:
+    """Return ``(label, Switch)`` in order of time; the label is that of the element boundary at which it happens."""
     found, index = elements(wrt), TimeIndex(wrt)
     times = physical_time(model, wrt)
     systems = disjunction_modes(model, index) | complementarity_modes(model, wrt, index) | surface_sides(model, index)
-    changes = [Switch(times[t], name, *both) for name, modes in systems.items() for t, *both in _changes(modes, found)]
+    changes = [(t, Switch(times[t], name, *both)) for name, modes in systems.items() for t, *both in _changes(modes, found)]
     for _, label, name, after in jumps_that_happen(model, wrt):
         before = [(x, value(x)) for x, _ in after]
-        changes.append(Switch(times[label], name, _state_values(before, index), _state_values(after, index)))
-    return Switches(sorted(changes, key=lambda s: s.time))
+        changes.append((label, Switch(times[label], name, _state_values(before, index), _state_values(after, index))))
+    return sorted(changes, key=lambda change: change[1].time)
 
 
 def _changes(modes, found: tuple[Element, ...]) -> Iterator[tuple]:
