@@ -7,7 +7,7 @@ from pyomo.core import Block, value
 from pyomo.dae import ContinuousSet
 
 from pyomo_fesd.core import Element, TimeIndex, find_continuous_set, strip_time
-from pyomo_fesd.results.complementarity_modes import complementarity_modes, positive_modes
+from pyomo_fesd.results.complementarity_modes import complementarity_modes, positive_modes, relatively_positive_modes
 from pyomo_fesd.results.disjunction_modes import disjunction_modes, surface_sides
 from pyomo_fesd.results.physical_time import elements, physical_time
 from pyomo_fesd.results.trajectory import jumps_that_happen
@@ -74,6 +74,7 @@ def _changes(modes, found: tuple[Element, ...]) -> Iterator[tuple]:
 def _active_mode(modes, element):
     """The mode with a positive multiplier inside an element; several slide; None where no multiplier is clear."""
     on = positive_modes(modes, element.points) or positive_modes(modes, (element.left,))
+    on = on or relatively_positive_modes(modes, element.points)
     if not on:
         return None
     return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on)

@@ -13,6 +13,7 @@ from pyomo_fesd.core import DeferredInterrupt, phase, refuse_foreign
 from pyomo_fesd.mpcc.compile import nl_file
 from pyomo_fesd.mpcc.compile.assemble import USER, assemble
 from pyomo_fesd.mpcc.compile.auxiliary_rows import auxiliary_rows
+from pyomo_fesd.mpcc.compile.conditionals import conditionals, resolved
 from pyomo_fesd.mpcc.compile.model_values import Contradiction
 from pyomo_fesd.mpcc.compile.mpcc_functions import MpccFunctions
 from pyomo_fesd.mpcc.compile.parameters import parameter_symbols
@@ -28,6 +29,7 @@ def compile_mpcc(
     user_scaling: bool = True,
     natural_units: str = USER,
     check=lambda: None,
+    conditions: bool = False,
 ) -> MpccFunctions:
     """Compile ``problem``.
 
@@ -47,6 +49,8 @@ def compile_mpcc(
         linear or small), 'user' (nothing: they stay as they are, and so does the objective, which gets its unit in the other cases)
     check : callable
         called between the steps; an exception of its own ends them
+    conditions : bool
+        whether ``Expr_if`` may stand in rows: kinks that nothing resolves, as in a smooth static model
 
     Raises
     ------
@@ -62,10 +66,21 @@ def compile_mpcc(
         auxiliary_rows(problem, symbols) as entries,
         interrupt.raising(),
     ):
-        nl = _through_file(problem.model, symbols, timer, folder, check)
+        nl = _read(problem.model, symbols, timer, folder, check, conditions)
         check()
         with phase(timer, 'assemble'):
             return assemble(problem, entries, nl, symbols, factors, natural_units)
+
+
+def _read(model, symbols, timer, folder, check, conditions):
+    """The model as an ``NlModel``; where it is refused for an ``Expr_if``, again without these, if they are accepted."""
+    try:
+        return _through_file(model, symbols, timer, folder, check)
+    except nl_file.HasConditions as refused:
+        if not conditions:
+            raise refused.error from None
+    with conditionals(model) as found:
+        return resolved(found, _through_file(model, symbols, timer, folder, check))
 
 
 def _through_file(model, symbols, timer, folder, check):

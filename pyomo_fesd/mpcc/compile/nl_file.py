@@ -167,12 +167,28 @@ def _unsupported(model, symbols, error):
     for component in model.component_data_objects(descend_into=Block, active=True):
         for node in _nodes(getattr(component, 'expr', None)):
             if _is_unsupported(node):
-                return FesdError(
-                    symbols.original(component),
-                    f"the function '{node.getname()}' cannot be evaluated here",
-                    "write it with exp, log, sqrt or a complementarity (for if-then-else: a Disjunction)",
+                error = FesdError(
+                    symbols.original(component), f"the function '{node.getname()}' cannot be evaluated here", _fix(node)
                 )
+                return HasConditions(error) if isinstance(node, Expr_ifExpression) else error
     return FesdError(model, f"casadi cannot read the model: {str(error).splitlines()[-1]}", "report this model")
+
+
+class HasConditions(Exception):
+    """A model contains ``Expr_if``; ``error`` says which component."""
+
+    def __init__(self, error: FesdError):
+        super().__init__(str(error))
+        self.error = error
+
+
+def _fix(node):
+    if isinstance(node, ExternalFunctionExpression):
+        return (
+            "casadi cannot call functions of a compiled library: take a property package whose equations are written out (as the "
+            "modular ones with an ideal equation of state), or solve this model with Ipopt's executable"
+        )
+    return "write it with exp, log, sqrt or a complementarity (for if-then-else: a Disjunction)"
 
 
 def _is_unsupported(node):
