@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pyomo.environ as pyo
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyomo.common.timing import HierarchicalTimer
 from pyomo.mpec import Complementarity, complements
@@ -97,6 +97,7 @@ def test_a_follower_has_the_side_of_its_leader(swapped):
     assert pyo.SolverFactory('mpec_hybrid').solve(m).solver.stationarity == 'B' and m.x.value == pytest.approx(1)
 
 
+@settings(deadline=None)
 @given(
     factors=st.lists(st.integers(0, 4), min_size=3, max_size=12),
     choices=st.lists(st.sampled_from([G_ZERO, H_ZERO]), min_size=11, max_size=11),
