@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # the same names as in _ROOMS, for editors and type checkers
     from pyomo_fesd import units
     from pyomo_fesd.analysis import branch_equations, report, structure
     from pyomo_fesd.core import FesdError, __version__
+    from pyomo_fesd.estimation import at, parmest_solver
     from pyomo_fesd.finite_elements import recollocate
     from pyomo_fesd.modeling import (
         absolute,
@@ -32,6 +33,8 @@ if TYPE_CHECKING:  # the same names as in _ROOMS, for editors and type checkers
     )
     from pyomo_fesd.refinement import refine
     from pyomo_fesd.results import element_lengths, physical_time, plot, switches, trajectory
+    from pyomo_fesd.scenarios import sweep
+    from pyomo_fesd.sensitivities import covariance, sensitivity
     from pyomo_fesd.simulation import simulate
     from pyomo_fesd.solvers import casadi_ipopt, certify
     from pyomo_fesd.starts import start_from
@@ -39,16 +42,19 @@ if TYPE_CHECKING:  # the same names as in _ROOMS, for editors and type checkers
 __all__ = [
     'FesdError',
     'absolute',
+    'at',
     'branch_equations',
     'casadi_ipopt',
     'certify',
     'clip',
     'clock',
     'contact',
+    'covariance',
     'element_lengths',
     'friction',
     'maximum',
     'minimum',
+    'parmest_solver',
     'physical_time',
     'plot',
     'positive_part',
@@ -56,11 +62,13 @@ __all__ = [
     'recollocate',
     'refine',
     'report',
+    'sensitivity',
     'signal',
     'simulate',
     'start_from',
     'state_jump',
     'structure',
+    'sweep',
     'switches',
     'trajectory',
     'units',
@@ -70,6 +78,7 @@ __all__ = [
 _ROOMS = {
     'analysis': ('branch_equations', 'report', 'structure'),
     'core': ('FesdError', '__version__'),
+    'estimation': ('at', 'parmest_solver'),
     'finite_elements': ('recollocate',),
     'modeling': (
         *('absolute', 'clip', 'clock', 'contact', 'friction', 'maximum', 'minimum', 'positive_part', 'projection', 'signal'),
@@ -77,6 +86,8 @@ _ROOMS = {
     ),
     'refinement': ('refine',),
     'results': ('element_lengths', 'physical_time', 'plot', 'switches', 'trajectory'),
+    'scenarios': ('sweep',),
+    'sensitivities': ('covariance', 'sensitivity'),
     'simulation': ('simulate',),
     'solvers': ('casadi_ipopt', 'certify'),
     'starts': ('start_from',),

@@ -9,6 +9,7 @@ The transformation reads the switched systems that other transformations recorde
 - ``time_complementarities``, ``mixed_complementarity``, ``continuity``, ``algebraic_graph``: conditions and their continuity
 - ``cross_complementarity``, ``state_jumps``, ``hysteresis``, ``right_limits``, ``mode_limits``, ``relations``: the laws of
   switching
+- ``contacts``, ``impulse_balance``, ``impact_laws``, ``friction_impulses``, ``curved_contacts``: rigid contacts
 - ``equilibration``, ``sliding_exit``, ``neighbour_branches``, ``coincidences``, ``arrivals``: the lengths, and hints for the
   homotopy
 - ``recollocation``, ``inner_points``: more points in the elements of a model that is discretised already

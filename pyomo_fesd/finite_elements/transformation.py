@@ -32,7 +32,7 @@ from pyomo_fesd.core import (
 )
 from pyomo_fesd.finite_elements.arrivals import add_arrivals
 from pyomo_fesd.finite_elements.coincidences import add_coincidences
-from pyomo_fesd.finite_elements.contacts import add_friction_impulses, read_contacts, with_departures
+from pyomo_fesd.finite_elements.contacts import read_contacts, with_departures
 from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
 from pyomo_fesd.finite_elements.controls import check_controls, fix_given, hold_controls
 from pyomo_fesd.finite_elements.cross_complementarity import add_cross_complementarity
@@ -40,6 +40,7 @@ from pyomo_fesd.finite_elements.equilibration import add_equilibration
 from pyomo_fesd.finite_elements.expansion import discretise
 from pyomo_fesd.finite_elements.explicit_time import expressions_over_time, warn_explicit_time
 from pyomo_fesd.finite_elements.free_time import check_free_time, factors
+from pyomo_fesd.finite_elements.friction_impulses import add_friction_impulses
 from pyomo_fesd.finite_elements.given_inputs import complete_params
 from pyomo_fesd.finite_elements.hysteresis import add_hysteresis, read_hysteresis
 from pyomo_fesd.finite_elements.lengths import add_lengths, check_orders, multiply_derivatives

@@ -11,6 +11,7 @@ from pyomo_fesd.simulation.impacts import ImpactEvents
 from pyomo_fesd.simulation.inputs import given_variables, prescribed_states
 from pyomo_fesd.simulation.largest_residuals import largest_residuals
 from pyomo_fesd.simulation.progress import Progress
+from pyomo_fesd.simulation.sizes import Sizes
 from pyomo_fesd.simulation.step_sizes import SimulatedElement
 
 #: Parts of an element's length, or of the length aimed at if that is longer.  A step shorter than the first is none: the rest of a
@@ -38,9 +39,9 @@ class ElementSolver:
         self._moving = moving_grids(model)[wrt]
         self._grid, self._hysteresis = self._moving.grid, read_hysteresis(self._moving)
         self._jumps = JumpEvents(self._moving.state_jumps)
-        if self._moving.state_jumps is not None and self._moving.state_jumps.impacts is not None:
-            # gaps and forces of contacts are 0 to round-off over long times, which is no size
-            self._options = {'natural_units': 'user'} | self._options
+        has_contacts = self._moving.state_jumps is not None and self._moving.state_jumps.impacts is not None
+        # gaps and forces of contacts are 0 to round-off over long times, which is no size
+        self._sizes = Sizes(self._times) if has_contacts else None
         self._impacts = ImpactEvents(self._moving.state_jumps, self._times, self._solve_impact)
         given = given_variables(model, self._times, inputs, self._moving.held)
         given.update(v for some in self._hysteresis for e in self._grid.elements for v in some.variables(e.right))
@@ -52,11 +53,12 @@ class ElementSolver:
         for modes in self._hysteresis:
             modes.begin(self._first)
             modes.set_weights(self._grid.elements[0])
+        self._learn_sizes()
         equations = self._reader.first(self._first)
         states = (v for d in derivatives(self._model, self._times.wrt) for v in d.get_state_var().values())
         refuse_undetermined_start(equations, [v for v in states if self._times.time(v) == self._first and not v.fixed])
         if equations.unknown:
-            initial = ElementClass(equations, None, (1.0,), self._options, self._timer, self._progress.deadline)
+            initial = ElementClass(self._sized(equations), None, (1.0,), self._options, self._timer, self._progress.deadline)
             if not initial.find_initial_values(equations) or self._reader.active_set(self._first) is None:
                 self._solve_first_mpcc(initial.mpcc, equations)
 
@@ -158,8 +160,22 @@ class ElementSolver:
     def _class(self, equations, nominal, tau):
         key = equations.element_class
         if key not in self._classes:
+            equations = self._sized(equations)
             self._classes[key] = ElementClass(equations, nominal, tau, self._options, self._timer, self._progress.deadline)
         return self._classes[key]
+
+    def _learn_sizes(self):
+        if self._sizes is not None:
+            element = self._grid.elements[0]
+            equations = self._read(element)
+            self._sizes.learn(equations, self._values_before(equations, element))
+
+    def _sized(self, equations):
+        """The equations with factors by the sizes of their variables; without contacts as they are."""
+        if self._sizes is None:
+            return equations
+        self._sizes.learn(equations, [v.value for v in equations.unknown])
+        return replace(equations, size_factor=self._sizes.factor)
 
     def _values_before(self, equations, element):
         """Values that the unknowns of an element have at its left boundary."""

@@ -8,7 +8,8 @@ Here, and not in ``mpcc``, solvers know of time: indicators of disjuncts, diagno
 """
 
 from pyomo_fesd.solvers.casadi_ipopt import CasadiIpopt, LegacyCasadiIpopt
-from pyomo_fesd.solvers.mpec_hybrid import LegacyMpecHybrid, MpecHybrid, certify
+from pyomo_fesd.solvers.mpec_hybrid import LegacyMpecHybrid, MpecHybrid, certified_model, certify
+from pyomo_fesd.solvers.options import MpecHybridConfig
 from pyomo_fesd.solvers.simulated_start import register_simulation
 from pyomo_fesd.solvers.unready_models import refuse_unready
 from pyomo_fesd.solvers.user_names import user_names
