@@ -47,14 +47,14 @@ class Completions:
         self._c, self._options, self._complete, self._after = setup.compiled, setup.options, setup.complete, setup.after
         self._subsolves, self._branches, self.run = subsolves, branches, subsolves.run
         self._form = 'scholtes' if self._options.relaxation == 'auto' else self._options.relaxation
-        self._deadline, self._promise = setup.deadline.part(SHARE), -np.inf
+        self._deadline, self._promise, self._possible = setup.deadline.part(SHARE), -np.inf, False
 
     def follow(self, start):
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
         for eps in (self._options.eps_init, self._options.eps_init * LOOSER):
             self._down(start, eps)
             self._improve()
-            if not self._promising() or self._deadline.expired():
+            if not self._possible or not self._promising() or self._deadline.expired():
                 break
         if self.run.point is not None:
             self._certify()
@@ -106,6 +106,7 @@ class Completions:
         for _ in range(ATTEMPTS):
             completed, is_complete, note = self._complete(w, seconds)
             self._subsolves.note(note, completed)
+            self._possible = self._possible or is_complete
             if is_complete:
                 self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
             result, equal = self._branches.beside(completed)

@@ -80,3 +80,10 @@ def test_no_round_begins_after_the_deadline():
     rounds.follow(p.compiled.x0)
     assert not asked
     assert p.run.point is None
+
+
+def test_a_second_path_is_no_help_where_nothing_can_be_completed():
+    p, rounds, asked = completions(lambda x: (0.0, False), lpec='reduced')
+    p.subsolves.attempt = lambda *args, **more: None
+    rounds.follow(p.compiled.x0)
+    assert p.run.point is None and len(asked) == 4
