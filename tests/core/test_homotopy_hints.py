@@ -12,6 +12,7 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity, complements
 
+import pyomo_fesd
 from pyomo_fesd.core import BranchConstraint, NeighbourBranch, Penalty, all_hints, homotopy_hints, records_below
 from pyomo_fesd.core.homotopy_hints import SCOPE
 from tests.models import dcs
@@ -165,6 +166,11 @@ def test_a_copy_of_a_discretised_model_has_hints_of_its_own(way):
     m = carried.build_with_jump(2 / 3)
     m.y = pyo.Var(m.t, initialize=0)
     m.sign = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 0, m.y[t] == 3], [m.x[t] >= 0, m.y[t] == 1]])
+    m.z = pyo.Var(m.t, initialize=0)
+    m.dz = dae.DerivativeVar(m.z)
+    m.z[0].fix(0)
+    m.ramp = pyo.Constraint(m.t, rule=lambda m, t: m.dz[t] == 1)
+    m.measured = pyo.Constraint(expr=pyomo_fesd.at(m.z, 0.3) <= 1)
     other = COPIES[way](move(dcs(m), 4, 2))
     ours, theirs = all_hints(m), all_hints(other)
     for kind in ours.__slots__:

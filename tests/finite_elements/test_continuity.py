@@ -143,8 +143,8 @@ def test_tied_are_just_the_variables_that_the_equations_determine(pattern, seed)
 class EveryIndexIsTime(TimeIndex):
     """Lets the constraints of the random systems, which stand at one time only, count as constraints over time."""
 
-    def _position(self, component):
-        return 0 if component.is_indexed() else None
+    def _read_place(self, component):
+        return super()._read_place(component)._replace(position=0 if component.is_indexed() else None)
 
 
 # At which time
