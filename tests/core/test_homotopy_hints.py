@@ -170,8 +170,9 @@ def test_a_copy_of_a_discretised_model_has_hints_of_its_own(way):
     m.dz = dae.DerivativeVar(m.z)
     m.z[0].fix(0)
     m.ramp = pyo.Constraint(m.t, rule=lambda m, t: m.dz[t] == 1)
+    move(dcs(m), 4, 2)
     m.measured = pyo.Constraint(expr=pyomo_fesd.at(m.z, 0.3) <= 1)
-    other = COPIES[way](move(dcs(m), 4, 2))
+    other = COPIES[way](m)
     ours, theirs = all_hints(m), all_hints(other)
     for kind in ours.__slots__:
         assert len(getattr(ours, kind)) == len(getattr(theirs, kind)) > 0
