@@ -25,7 +25,7 @@ from pyomo_fesd.mpcc.compile.mpcc_functions import (
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.parameters import parameter_values
 from pyomo_fesd.mpcc.compile.round_off import EXACT
-from pyomo_fesd.mpcc.compile.scaled_functions import LARGE, ScaledFunctions
+from pyomo_fesd.mpcc.compile.scaled_functions import LARGE, ScaledFunctions, ScaledRows
 from pyomo_fesd.mpcc.compile.scaling import Scale, side_factors
 from pyomo_fesd.mpcc.compile.sizes import row_factors, variable_factors, without_small
 
@@ -79,29 +79,29 @@ class _Assembly:
         self._problem, self._rows, self._factors = problem, rows, factors
         self._parameters = symbols.parameters
         self._variables, self._constraints = rows.variables, [symbols.original(c) for c in rows.constraints]
-        self._m, self._q = len(rows.constraints), len(rows.conditions)
+        self._q = len(rows.conditions)
         self._start, _ = start_values(self._variables)
         self._p = parameter_values(self._parameters)
-        self._user_x = factors.of(self._variables)
-        self._kind = ca.SX if expanded or rows.main.size + rows.others.size <= LARGE else ca.MX
+        size = sum(functions.size for functions in (rows.cost, rows.rows, rows.sides, rows.others))
+        self._kind = ca.SX if expanded or size <= LARGE else ca.MX
 
     def by_user(self):
         """The user's factors of variables, rows and objective."""
-        return _Factors(self._user_x, self._factors.of(self._constraints), float(self._factors.of([self._problem.objective])[0]))
+        of = self._factors.of
+        return _Factors(of(self._variables), of(self._constraints), float(of([self._problem.objective])[0]))
 
     def by_starts(self):
         """The same, or by sizes where these are far from 1 and the user gave none."""
-        user, rows, m = self.by_user(), self._rows, self._m
-        begin = without_small(self._start)
-        J, constants = self._linearised(begin)
+        user, m = self.by_user(), len(self._constraints)
+        J, constants = self._linearised(without_small(self._start))
         # sides are zero at solutions, and so may be what is left of them
         certain = constants.copy()
         certain[m:] = without_small(certain[m:])
         columns = {id(v): j for j, v in enumerate(self._variables)}
         alike = [[columns[id(v)] for v in group if id(v) in columns] for group in self._problem.hints.alike]
-        sizes = (certain, constants), self._start, stated_bounds(self._variables), user.x, [group for group in alike if group]
-        s_x = variable_factors(J, *sizes)
-        J = csr(rows.main.jacobian(self._at(self._start)))[2 : 2 + m]
+        alike = [group for group in alike if group]
+        s_x = variable_factors(J, (certain, constants), self._start, stated_bounds(self._variables), user.x, alike)
+        J = csr(self._rows.rows.jacobian(self._at(self._start)))
         return replace(user, x=s_x, g=row_factors(J @ sparse.diags(1 / s_x), user.g))
 
     def _linearised(self, w):
@@ -109,30 +109,26 @@ class _Assembly:
 
         A constant in which terms cancel has their size.
         """
-        main, m, at = self._rows.main, self._m, self._at(w)
-        chosen = slice(2, 2 + m + 2 * self._q)
-        J = csr(main.jacobian(at))[chosen]
-        bounds = np.concatenate([self._rows.lbg, np.zeros(2 * self._q)])
-        found = main.values(at).full().ravel()[chosen] - J @ w
+        at, both, sides = self._at(w), (self._rows.rows, self._rows.sides), 2 * self._q
+        count = len(self._constraints) + sides
+        J = sparse.vstack([csr(functions.jacobian(at)) for functions in both]).tocsr()[:count]
+        values, terms = (
+            np.concatenate(parts)[:count] for parts in zip(*((_column(f.values(at)), f.parameter_terms(at)) for f in both))
+        )
+        found, bounds = values - J @ w, np.concatenate([self._rows.lbg, np.zeros(sides)])
         constants = np.abs(found - np.where(np.isfinite(bounds), bounds, 0.0))
         exact = constants > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
-        cancelling = np.maximum(self._rows.cancelling, main.parameter_terms(at)[chosen])
-        return J, np.maximum(np.where(exact, constants, 0.0), cancelling)
+        return J, np.maximum(np.where(exact, constants, 0.0), np.maximum(self._rows.cancelling, terms))
 
     def _at(self, w):
         return ca.DM(np.concatenate([w, self._p]).tolist())
 
     def functions(self, factors):
         """The ``MpccFunctions`` with these factors."""
-        rows, problem, s_x = self._rows, self._problem, factors.x
+        rows, problem, hints = self._rows, self._problem, self._problem.hints
+        scale, values = self._scale(factors), self._model_values(factors.x)
         sign = -1.0 if problem.objective is not None and problem.objective.sense == maximize else 1.0
-        sides = self._side_factors(s_x)
-        scale = Scale(
-            s_x, factors.g, factors.f, np.where(rows.plain >= 0, s_x[rows.plain], sides) if len(s_x) else sides, factors.offset
-        )
-        values = self._model_values(s_x)
         positions = _positions_of(rows.conditions), {id(v): [j] for j, v in enumerate(self._variables)}
-        hints = problem.hints
         data = MpccData(
             lbg=rows.lbg * scale.g,
             ubg=rows.ubg * scale.g,
@@ -141,7 +137,7 @@ class _Assembly:
             has_objective=problem.objective is not None,
             scale=scale,
             tentative=np.array([d.tentative for d in problem.decisions], dtype=bool),
-            neighbours=_neighbours(hints.neighbour_branches, *positions, s_x),
+            neighbours=_neighbours(hints.neighbour_branches, *positions, scale.x),
             coincidences=[_coincidence(hint, *positions) for hint in hints.coincidences],
             arrivals=arrival_indices(hints.arrivals, *positions),
             followers=_followers(hints.followers, positions[0]),
@@ -150,36 +146,43 @@ class _Assembly:
         functions = self._scaled_functions(scale, sign)
         return MpccFunctions(functions, data, self._variables, self._constraints, rows.conditions, problem.decisions, values)
 
-    def _scaled_functions(self, scale, sign):
-        main, others, d = self._rows.main, self._rows.others, len(self._problem.decisions)
-        # the number in the objective changes, so that nothing is lost to round-off
-        constants = main.constants.copy()
-        constants[0] -= sign * scale.offset
-        main = replace(main, constants=constants)
-        J = csr(others.jacobian(self._at(self._start))) @ sparse.diags(1 / scale.x)
-        of_others = np.concatenate([np.ones(d), _factors_of_expressions(J[d:], np.ones(J.shape[0] - d))])
-        factors = np.concatenate([[sign * scale.f, scale.f], scale.g, scale.sides, np.ones(d)])
-        return ScaledFunctions(main, others, (self._m, self._q, d), scale.x, factors, of_others, self._kind)
-
-    def _side_factors(self, s_x):
-        """Factors of sides as if none were a plain variable."""
+    def _scale(self, factors):
+        """Factors of sides besides the others: a side that is a plain variable has that variable's."""
+        sides, plain = self._of_expressions(self._rows.sides, factors.x)[: 2 * self._q], self._rows.plain
         given = self._factors.of([c.source for c in self._rows.conditions] * 2)
-        J = csr(self._rows.main.jacobian(self._at(self._start)))[2 + self._m : 2 + self._m + 2 * self._q]
-        return _factors_of_expressions(J @ sparse.diags(1 / s_x), given)
+        sides = side_factors(sides, given)
+        sides[plain >= 0] = factors.x[plain[plain >= 0]]
+        return Scale(factors.x, factors.g, factors.f, sides, factors.offset)
+
+    def _of_expressions(self, functions, s_x):
+        """The largest entry of the gradient of each function at the start; 0 where it has none."""
+        J = abs(csr(functions.jacobian(self._at(self._start))) @ sparse.diags(1 / s_x))
+        largest = J.max(axis=1).toarray().ravel() if 0 not in J.shape else np.zeros(J.shape[0])
+        return np.where(np.isfinite(largest), largest, 0.0)
+
+    def _scaled_functions(self, scale, sign):
+        rows, d = self._rows, len(self._problem.decisions)
+        # the number in the objective changes, so that nothing is lost to round-off
+        cost = replace(rows.cost, constants=rows.cost.constants - [sign * scale.offset, 0.0])
+        gauges = self._of_expressions(rows.others, scale.x)[d:]
+        decided = np.ones(d)
+        parts = (
+            (cost, np.array([sign * scale.f, scale.f])),
+            (rows.rows, scale.g),
+            (rows.sides, np.concatenate([scale.sides, decided])),
+            (rows.others, np.concatenate([decided, side_factors(gauges, np.ones(len(gauges)))])),
+        )
+        return ScaledFunctions(*(ScaledRows(*part, scale.x) for part in parts), self._q, self._kind)
 
     def _model_values(self, s_x):
-        guides = self._problem.hints.guide_bounds
-        guide = [guides.get(v.parent_component(), UNBOUNDED) for v in self._variables]
-        are_sides = np.zeros(len(self._variables), dtype=bool)
-        are_sides[self._rows.plain[self._rows.plain >= 0]] = True
-        guide = np.array(guide, dtype=float).reshape(-1, 2)
-        return ModelValues(self._variables, self._parameters, are_sides, guide, s_x, self._rows.splits)
+        guides, sides = self._problem.hints.guide_bounds, np.zeros(len(self._variables), dtype=bool)
+        sides[self._rows.plain[self._rows.plain >= 0]] = True
+        guide = np.array([guides.get(v.parent_component(), UNBOUNDED) for v in self._variables], dtype=float).reshape(-1, 2)
+        return ModelValues(self._variables, self._parameters, sides, guide, s_x, self._rows.splits)
 
 
-def _factors_of_expressions(J, given):
-    """The user's factors of functions with the Jacobian ``J``, or a mild gradient."""
-    largest = abs(J).max(axis=1).toarray().ravel() if 0 not in J.shape else np.zeros(J.shape[0])
-    return side_factors(np.where(np.isfinite(largest), largest, 0.0), given)
+def _column(values):
+    return values.full().ravel()
 
 
 def _positions_of(conditions):

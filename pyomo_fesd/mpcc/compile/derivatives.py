@@ -43,21 +43,17 @@ class Outer:
         both, of_f, of_rows = ca.vertcat(self.z, self.s), ca.SX.sym('lam_f'), ca.SX.sym('lam', self.rows.numel())
         cost = ca.SX(self.cost)
         lagrangian = of_f * cost + _dot(of_rows, self.rows)
-        # one function for each order: casadi evaluates all outputs of one
-        symbols, at = [self.z, self.s, self.parameter], [z, s, parameter]
-        orders = (
-            (symbols, at, {'weight': ca.SX(self.weight), 'cost': cost, 'rows': self.rows}),
-            (symbols, at, {'cost_gradient': ca.gradient(cost, both), 'rows_jacobian': ca.jacobian(self.rows, both)}),
-            (
-                [*symbols, of_f, of_rows],
-                [*at, lam_f, lam],
-                {'factors': ca.gradient(lagrangian, self.z), 'hessian': ca.hessian(lagrangian, both)[0]},
-            ),
-        )
-        found = {}
-        for inputs, values, pieces in orders:
-            found |= zip(pieces, ca.Function('outer', inputs, list(pieces.values())).call(values))
-        return found
+        pieces = {
+            'weight': ca.SX(self.weight),
+            'cost': cost,
+            'rows': self.rows,
+            'cost_gradient': ca.gradient(cost, both),
+            'rows_jacobian': ca.jacobian(self.rows, both),
+            'factors': ca.gradient(lagrangian, self.z),
+            'hessian': ca.hessian(lagrangian, both)[0],
+        }
+        inputs, values = [self.z, self.s, self.parameter, of_f, of_rows], [z, s, parameter, lam_f, lam]
+        return {name: _at(piece, inputs, values) for name, piece in pieces.items()}
 
 
 @dataclass(frozen=True)
@@ -93,13 +89,15 @@ class ModelDerivatives:
         self._functions, self._at = functions, (w, p)
         self.__dict__.update(functions.outputs(w, p))
         self.z = ca.vertcat(self.G, self.H, self.equal)
-        J, m = functions.jacobian(w, p), functions.sizes[0]
-        self.gradient_f, self.gradient_penalty = J[0, :].T, J[1, :].T
-        self.J_g, self.J_z = J[2 : 2 + m, :], J[2 + m :, :]
+        cost = functions.cost.jacobian(w, p)
+        self.gradient_f, self.gradient_penalty = cost[0, :].T, cost[1, :].T
+        self.J_g, self.J_z = functions.rows.jacobian(w, p), functions.sides.jacobian(w, p)
 
     def hessian(self, of_f, of_penalty, of_g, of_z):
         """Return the upper triangle of the Hessian of the functions with these factors."""
-        return self._functions.hessian(*self._at, ca.vertcat(of_f, of_penalty, of_g, of_z))
+        c = self._functions
+        parts = (c.cost, ca.vertcat(of_f, of_penalty)), (c.rows, of_g), (c.sides, of_z)
+        return sum((rows.hessian(*self._at, factors) for rows, factors in parts[1:]), parts[0][0].hessian(*self._at, parts[0][1]))
 
 
 def composed(c, outer: Outer) -> Nlp:
@@ -151,6 +149,13 @@ def with_parts(nlp: Nlp, up, down) -> Nlp:
     )
     parts = between(x, n, x.numel())
     return Nlp(x, nlp.p, ca.sum1(parts), g + ca.mtimes(E, parts), derivatives)
+
+
+def _at(expression, inputs, values):
+    """An SX expression at ``values``, of which only those that it depends on are evaluated."""
+    used = [k for k, symbol in enumerate(inputs) if symbol.numel() and ca.depends_on(expression, symbol)]
+    function = ca.Function('piece', [inputs[k] for k in used], [expression])
+    return function.call([values[k] for k in used])[0] if used else type(values[0])(ca.evalf(expression))
 
 
 def _dot(factors, rows):

@@ -5,7 +5,6 @@ Leaves: ``ModelRows``, in the units of the model.
 """
 
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 
@@ -35,8 +34,8 @@ class ModelRows:
     side_of : int array (2q), equal numbers for equal sides
     plain : int array (2q), the variable that a side is, -1 for others
     splits : list, as in ``ModelValues``
-    main : RowFunctions, f, penalty, g, G, H and the decisions' equations, of the variables and the parameters
-    others : RowFunctions, eta and gauges
+    cost, rows, sides, others : RowFunctions of the variables and the parameters
+        f and penalty; g; G, H and the decisions' equations; eta and gauges
     """
 
     variables: list
@@ -48,7 +47,9 @@ class ModelRows:
     side_of: np.ndarray
     plain: np.ndarray
     splits: list
-    main: RowFunctions
+    cost: RowFunctions
+    rows: RowFunctions
+    sides: RowFunctions
     others: RowFunctions
 
 
@@ -91,7 +92,7 @@ def _functions(reader, objective, rows, entries, parameters):
     column = {id(v): j for j, v in enumerate([*free, *parameters])}
     lbg, ubg, of_rows = _bounds(rows)
     of_sides = _clean(sides)
-    main = [objective, entries.penalty, *([row] for row in chain(rows, sides, entries.equal))]
+    functions = [objective, entries.penalty], *([[row] for row in some] for some in (rows, [*sides, *entries.equal], others))
     return ModelRows(
         free,
         [row.source for row in rows],
@@ -102,8 +103,7 @@ def _functions(reader, objective, rows, entries, parameters):
         np.unique([id(row) for row in sides], return_inverse=True)[1].astype(int),
         np.array([column[id(entries.plain[row])] if row in entries.plain else -1 for row in sides], dtype=int),
         entries.splits,
-        grouped_rows(main, column, len(free), reader.parts),
-        grouped_rows([[row] for row in others], column, len(free), reader.parts),
+        *(grouped_rows(some, column, len(free), reader.parts) for some in functions),
     )
 
 

@@ -212,8 +212,7 @@ class MpccFunctions:
         self.__dict__.update(vars(data))
         self.variables, self.constraints, self.conditions, self.decisions = variables, constraints, conditions, decisions
         self._model_values = model_values
-        self.kind, (_, self.pairs, decided) = functions.kind, functions.sizes
-        self.inner = 2 * self.pairs + decided
+        self.kind, self.pairs, self.inner = functions.kind, functions.pairs, 2 * functions.pairs + functions.decisions
         self.x, self.p = self.kind.sym('w', len(self.x0)), self.kind.sym('p', len(self.parameters))
         self.__dict__.update(functions.outputs(self.x, self.p))
 
@@ -235,31 +234,26 @@ class MpccFunctions:
 
     @cached_property
     def _jacobian(self):
-        """Function of the nonzeros of the Jacobian of f, g, G, H and equal, and the empty matrices that they belong to."""
-        J = self._functions.jacobian(self.x, self.p)
-        (m, q, d), parts = self._functions.sizes, []
-        for first, count in zip((0, 2, 2 + m, 2 + m + q, 2 + m + 2 * q), (1, m, q, q, d)):
-            parts.append(J[first : first + count, :])
-        return ca.Function('jacobian', [self.x, self.p], [part.nz[:] for part in parts]), [
-            _Pattern(part.sparsity()) for part in parts
-        ]
+        """Function of the nonzeros of the Jacobians of f, g, G, H and equal, and the matrices that they belong to."""
+        c, at, q = self._functions, (self.x, self.p), self.pairs
+        sides = c.sides.jacobian(*at)
+        matrices = [c.cost.jacobian(*at)[0, :], c.rows.jacobian(*at), sides[:q, :], sides[q : 2 * q, :], sides[2 * q :, :]]
+        return ca.Function('jacobian', list(at), [J.nz[:] for J in matrices]), [_Pattern(J.sparsity()) for J in matrices]
 
     @property
     def linear(self) -> bool:
         """Whether all rows and sides are linear."""
-        m, q, _ = self._functions.sizes
-        return not self._functions.main.nonlinear[2 : 2 + m + 2 * q].any()
+        return not (self._functions.rows.functions.nonlinear.any() or self.nonlinear_sides.any())
 
     @property
     def nonlinear_sides(self) -> np.ndarray:
         """Mask over the sides (2q) that are not linear."""
-        m, q, _ = self._functions.sizes
-        return self._functions.main.nonlinear[2 + m : 2 + m + 2 * q]
+        return self._functions.sides.functions.nonlinear[: 2 * self.pairs]
 
     def parameter_terms(self, w) -> np.ndarray:
         """Return the sizes of the terms of parameters in g and in the sides at ``w``."""
-        m, q, _ = self._functions.sizes
-        return self._functions.parameter_terms(w, self.parameters)[2 : 2 + m + 2 * q]
+        parts = [rows.parameter_terms(w, self.parameters) for rows in (self._functions.rows, self._functions.sides)]
+        return np.concatenate(parts)[: len(self.lbg) + 2 * self.pairs]
 
     def __getstate__(self):
         return self._functions, self._data

@@ -129,8 +129,9 @@ class _Sum:
     def matrix(self, numbers):
         """The matrix of ``numbers`` (a column)."""
         kind = type(numbers)
-        entries = ca.densify(kind(self._base) + ca.mtimes(self._terms, numbers))
-        return kind(self._sparsity, entries)
+        if not self._terms.nnz():
+            return kind(ca.DM(self._sparsity, self._base))
+        return kind(self._sparsity, ca.densify(kind(self._base) + ca.mtimes(self._terms, numbers)))
 
     column = matrix
 
