@@ -12,6 +12,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from pyomo_fesd.mpcc.compile.elementwise import elementwise
+
 
 def _fields(self):
     return {name: getattr(self, name) for name in self.__dataclass_fields__}
@@ -27,7 +29,7 @@ without_cache = _fields, _restore
 
 @dataclass(frozen=True, eq=False)
 class RowClass:
-    """n instances of a function.
+    """n instances of a function with one value, or one of a function with several.
 
     Attributes
     ----------
@@ -47,7 +49,7 @@ class RowClass:
     __getstate__, __setstate__ = without_cache
 
     def values(self, x):
-        """Column of the values of all instances, by ``rows`` in Fortran order."""
+        """Column of the values of all instances, in the order of ``rows``."""
         return self._of_all(self.value, x)
 
     @property
@@ -60,7 +62,7 @@ class RowClass:
     def slope_places(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows and columns of ``slopes``."""
         _, row, slot = self._slope
-        return self.rows[row].ravel('F'), self.columns[slot].ravel('F')
+        return self.rows[row].ravel(), self.columns[slot].ravel()
 
     def slopes(self, x):
         """Column of the first derivatives by all variables."""
@@ -70,21 +72,23 @@ class RowClass:
     def curvature_places(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows and columns of ``curvatures``, in the upper triangle."""
         _, first, second = self._curvature
-        both = self.columns[first].ravel('F'), self.columns[second].ravel('F')
+        both = self.columns[first].ravel(), self.columns[second].ravel()
         return np.minimum(*both), np.maximum(*both)
 
     def curvatures(self, x, factors):
         """Column of the second derivatives of the sum of all values times ``factors``, which are by row."""
-        of_rows = ca.reshape(factors[self.rows.ravel('F').tolist()], self.rows.shape[0], self.rows.shape[1])
-        return self._of_all(self._curvature[0], x, of_rows)
+        return self._of_all(self._curvature[0], x, factors[self.rows.ravel().tolist()])
 
-    def _of_all(self, function, x, *more):
-        count = self.columns.shape[1]
-        s = ca.reshape(x[self.columns.ravel('F').tolist()], *self.columns.shape)
-        if function.numel_out(0) == 0 or not count:
-            return type(x)(0, 1)
-        mapped = function if count == 1 else function.map(count)
-        return ca.vec(mapped(s, ca.DM(self.constants), *more))
+    def _of_all(self, function, x, *factors):
+        """Column of the outputs of all instances, those of one output together."""
+        kind, count = type(x), self.columns.shape[1]
+        if function.numel_out(0) == 0:
+            return kind(0, 1)
+        if count == 1:
+            return ca.vec(function(x[self.columns[:, 0].tolist()], ca.DM(self.constants), *factors))
+        s = [x[columns.tolist()] for columns in self.columns]
+        constants = [kind(ca.DM(numbers.tolist())) for numbers in self.constants]
+        return ca.vertcat(*elementwise(function, [s, constants, *([f] for f in factors)], count))
 
     @cached_property
     def _symbolic(self):

@@ -84,7 +84,7 @@ class RowFunctions:
 
     @cached_property
     def _values(self):
-        return _Sum((len(self.constants), 1), *_together((k.rows.ravel('F'), np.zeros(k.rows.size, int)) for k in self.classes))
+        return _Sum((len(self.constants), 1), *_together((k.rows.ravel(), np.zeros(k.rows.size, int)) for k in self.classes))
 
     @cached_property
     def _slopes(self):
