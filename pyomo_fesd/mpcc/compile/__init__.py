@@ -3,10 +3,10 @@
 Read in this order: ``read_mpcc`` (the model as pairs, decisions and hints), ``compile`` (the way through this room), ``parameters``
 (symbols for values that may change), ``row_reader`` (expressions as rows) with ``unreadable`` (its errors), ``entries`` (sides,
 decisions, terms as rows), ``nonlinear_parts`` (their canonical form), ``round_off`` (constants in which fixed values cancel),
-``model_rows`` (all of it), ``grouped_rows`` (classes of equal form), ``row_classes`` and ``row_functions`` (their values and
-derivatives), ``scaling``, ``sizes`` and ``natural_units`` (factors from the model's own numbers), ``assemble``, ``scaled_functions``,
-``model_values`` (bounds and starts), ``mpcc_functions`` (the result), ``derivatives`` (chain rule for all NLPs), ``staleness``
-(changes of the model after it was compiled), ``nl_file`` (a file to keep).
+``model_rows`` (all of it), ``grouped_rows`` (classes of equal form), ``row_classes`` with ``elementwise`` and ``row_functions``
+(values and derivatives), ``scaling``, ``sizes`` and ``natural_units`` (factors from the model's own numbers), ``assemble``,
+``scaled_functions``, ``model_values`` (bounds and starts), ``mpcc_functions`` (the result), ``derivatives`` (chain rule for all
+NLPs), ``staleness`` (changes of the model after it was compiled), ``nl_file`` (a file to keep).
 """
 
 from pyomo_fesd.mpcc.compile.assemble import NATURAL_UNITS

@@ -105,16 +105,15 @@ class _Assembly:
         return replace(user, x=s_x, g=row_factors(J @ sparse.diags(1 / s_x), user.g))
 
     def _linearised(self, w):
-        """Jacobian of rows and sides, and the sizes of their distances from bounds where the variables are 0, without rounding errors.
+        """Jacobian of rows and sides, and the sizes of their distances from bounds where the variables are 0.
 
-        A constant in which terms cancel has their size.
+        Rounding errors are 0, and a constant in which terms cancel has their size.
         """
         at, both, sides = self._at(w), (self._rows.rows, self._rows.sides), 2 * self._q
         count = len(self._constraints) + sides
         J = sparse.vstack([csr(functions.jacobian(at)) for functions in both]).tocsr()[:count]
-        values, terms = (
-            np.concatenate(parts)[:count] for parts in zip(*((_column(f.values(at)), f.parameter_terms(at)) for f in both))
-        )
+        parts = [(_column(functions.values(at)), functions.parameter_terms(at)) for functions in both]
+        values, terms = (np.concatenate(some)[:count] for some in zip(*parts))
         found, bounds = values - J @ w, np.concatenate([self._rows.lbg, np.zeros(sides)])
         constants = np.abs(found - np.where(np.isfinite(bounds), bounds, 0.0))
         exact = constants > EXACT * (abs(J) @ np.abs(w) + np.abs(found))

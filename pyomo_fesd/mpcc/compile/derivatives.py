@@ -29,7 +29,7 @@ class Derivatives:
 
 @dataclass(frozen=True)
 class Outer:
-    """Functions of inner functions z, slacks s and a parameter (SX symbols): ``cost`` C, ``rows`` T and ``weight`` of the penalty."""
+    """Functions of inner functions z, slacks s and a parameter (SX): ``cost`` C, ``rows`` T and ``weight`` of the penalty."""
 
     z: object
     s: object

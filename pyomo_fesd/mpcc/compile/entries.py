@@ -1,7 +1,8 @@
 """The expressions of an MPCC besides the model's own rows: sides of pairs, decisions, penalty terms, gauges.
 
 Takes: an ``Mpcc``, the symbols of its parameters, a ``RowReader``.
-Leaves: ``Entries``; while the context is open, auxiliary variables and their equations on a temporary block.  Afterwards the model is as it was.
+Leaves: ``Entries``; while the context is open, auxiliary variables and their equations on a temporary block.  Afterwards the model
+is as it was.
 """
 
 from contextlib import contextmanager

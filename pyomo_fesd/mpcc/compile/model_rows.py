@@ -90,6 +90,7 @@ def _functions(reader, objective, rows, entries, parameters):
     fixed = {id(p) for p in parameters}
     free = [v for v in variables if id(v) not in fixed]
     column = {id(v): j for j, v in enumerate([*free, *parameters])}
+    number = {row: k for k, row in enumerate(dict.fromkeys(sides))}
     lbg, ubg, of_rows = _bounds(rows)
     of_sides = _clean(sides)
     functions = [objective, entries.penalty], *([[row] for row in some] for some in (rows, [*sides, *entries.equal], others))
@@ -100,7 +101,7 @@ def _functions(reader, objective, rows, entries, parameters):
         ubg,
         np.concatenate([of_rows, of_sides]),
         [entries.conditions[k] for k in pairs],
-        np.unique([id(row) for row in sides], return_inverse=True)[1].astype(int),
+        np.array([number[row] for row in sides], dtype=int),
         np.array([column[id(entries.plain[row])] if row in entries.plain else -1 for row in sides], dtype=int),
         entries.splits,
         *(grouped_rows(some, column, len(free), reader.parts) for some in functions),

@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass
 from functools import reduce
 from itertools import accumulate
+from math import isfinite
 
 import casadi as ca
 
@@ -49,7 +50,7 @@ LONGEST = 50
 
 
 class Unsupported(Exception):
-    """A function that cannot be evaluated."""
+    """A function or a number that cannot be evaluated."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,13 @@ class NonlinearParts:
     _order = {}
 
 
+def _finite(text):
+    number = float(text)
+    if not isfinite(number):
+        raise Unsupported(text)
+    return number
+
+
 def of_form(form, variables, constants):
     """Return the value of a canonical form at its variables and constants (lists of casadi scalars).
 
@@ -178,7 +186,7 @@ def evaluate(text, values, constants=()):
         elif line == 'c':
             stack.append(constants.pop())
         elif line[0] == 'n':
-            stack.append(ca.SX(float(line[1:])))
+            stack.append(ca.SX(_finite(line[1:])))
         elif line.isdecimal():
             stack.append(int(line))
         elif line in OPERATIONS:
