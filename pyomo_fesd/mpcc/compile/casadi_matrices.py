@@ -43,4 +43,4 @@ def times(factors, matrix):
     """``matrix`` with each nonzero times one of ``factors`` (array); itself if all of them are 1."""
     if np.all(factors == 1.0):
         return matrix
-    return type(matrix)(matrix.sparsity(), ca.DM(np.asarray(factors, dtype=float).tolist()) * matrix.nz[:])
+    return type(matrix)(matrix.sparsity(), ca.DM(np.asarray(factors, dtype=float).tolist()) * ca.vec(matrix.nz[:]))
