@@ -17,8 +17,7 @@ from itertools import chain
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.contrib.incidence_analysis import IncidenceMethod, get_incident_variables
-from pyomo.contrib.incidence_analysis.dulmage_mendelsohn import dulmage_mendelsohn
+from pyomo.common.dependencies import attempt_import
 from pyomo.core import Block, Constraint, Objective, Var, value
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
@@ -27,6 +26,8 @@ from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from pyomo_fesd.core import TimeIndex, all_switched_systems, moving_grids, read_complementarity, refuse_no_model
 
+#: Imported when it is first used, since it imports networkx.
+incidence, _ = attempt_import('pyomo.contrib.incidence_analysis')
 INDEX = re.compile(r'\[[^\]]*\]')
 #: Number of names that a message lists.
 SHOWN = 3
@@ -161,7 +162,7 @@ def _incident_variables(expression):
     """Variables that are not fixed, without those whose coefficient is zero."""
     if not hasattr(expression, 'is_expression_type'):
         return ()
-    return get_incident_variables(expression, include_fixed=False, method=IncidenceMethod.standard_repn)
+    return incidence.get_incident_variables(expression, include_fixed=False, method=incidence.IncidenceMethod.standard_repn)
 
 
 def _incidence(rows, width):
@@ -177,7 +178,7 @@ def _faults(matrix, equations, unknowns):
     if len(matching) == len(equations) == len(unknowns):
         return [], [], [], []
     # the matching is scipy's: that of Pyomo recurses once for each equation of a chain
-    rows, columns = dulmage_mendelsohn(matrix, matching=matching)
+    rows, columns = incidence.dulmage_mendelsohn.dulmage_mendelsohn(matrix, matching=matching)
     names = (
         (unknowns, columns.unmatched),
         (unknowns, [*columns.unmatched, *columns.underconstrained]),

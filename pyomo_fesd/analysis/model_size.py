@@ -4,8 +4,10 @@ Takes: a model, before or after the transformations.
 Leaves: the model as it is.
 """
 
-import pandas as pd
+from __future__ import annotations
+
 from pyomo.common.collections import ComponentSet
+from pyomo.common.dependencies import pandas as pd
 from pyomo.core import Block, Constraint, Objective
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunct, Disjunction

@@ -15,7 +15,7 @@ from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
 from pyomo_fesd.core.complementarity import Mixed, Pair, distance_to_bound, read_complementarity, read_side
 from pyomo_fesd.core.errors import FesdError
 from pyomo_fesd.core.evaluation import kept_values, known_sign, mutable_parameters, value_or_nan, value_or_zero
-from pyomo_fesd.core.expression_key import Swap, component_key, expression_key, prefix_tokens
+from pyomo_fesd.core.expression_key import Swap, component_key, exchanged, expression_key, prefix_tokens
 from pyomo_fesd.core.generated import GENERATED, is_generated, public_name, source_name
 from pyomo_fesd.core.gradient import gradient
 from pyomo_fesd.core.grid import (

@@ -108,11 +108,18 @@ def expression_key(expressions, kind) -> tuple:
         return None, []
 
 
+#: Pyomo takes longer to make a visitor than to use it.
+_VISITOR = ExpressionReplacementVisitor()
+
+
+def exchanged(expr, others: dict):
+    """Return ``expr`` with other components, given by the ids of the present ones; named Expressions are written out."""
+    _VISITOR.substitute = others
+    return _VISITOR.walk_expression(expr)
+
+
 class Swap:
     """Exchange the components of one expression for those of another that has the same ``expression_key``."""
-
-    #: Pyomo takes longer to make a visitor than to use it.
-    _VISITOR = ExpressionReplacementVisitor()
 
     def __init__(self, parts, others):
         self._other = {id(part): other for part, other in zip(parts, others)}
@@ -122,5 +129,4 @@ class Swap:
 
     def expression(self, expr):
         """Return ``expr`` with the components of the other."""
-        self._VISITOR.substitute = self._other
-        return self._VISITOR.walk_expression(expr)
+        return exchanged(expr, self._other)

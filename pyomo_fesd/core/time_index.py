@@ -1,8 +1,9 @@
 """Find the time in the index of a component: ``unit[a].hyb[0.5].dj['k']`` is split into 0.5 and the rest."""
 
 from collections import defaultdict
+from typing import Any, NamedTuple
 
-from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Constraint, Var
 from pyomo.core.base.block import BlockData
 from pyomo.dae import ContinuousSet, DerivativeVar
@@ -54,8 +55,27 @@ def time_position(component, wrt) -> int | None:
     return None
 
 
+class _Place(NamedTuple):
+    """A component and the blocks around it.
+
+    Attributes
+    ----------
+    component : IndexedComponent or Block
+        kept, so that no other one gets its id
+    outer, inner : time labels of the outermost and of the innermost block over time around it, None without one
+    name : with ``*`` in place of the time
+    position : of the time in its own index, or None
+    """
+
+    component: Any
+    outer: float | None
+    inner: float | None
+    name: str
+    position: int | None
+
+
 class TimeIndex:
-    """Split the index of component data into the time label and the rest; the position in each component is found once.
+    """Split the index of component data into the time label and the rest; each component is read once.
 
     Parameters
     ----------
@@ -66,39 +86,44 @@ class TimeIndex:
 
     def __init__(self, wrt):
         self.wrt = wrt
-        self._positions = ComponentMap()
+        self._places = {}
 
-    def _position(self, component):
-        if component not in self._positions:
-            self._positions[component] = time_position(component, self.wrt)
-        return self._positions[component]
+    def _place(self, component):
+        place = self._places.get(id(component))
+        if place is None:
+            place = self._places[id(component)] = self._read_place(component)
+        return place
+
+    def _read_place(self, component):
+        block = component.parent_block()
+        if block is None:
+            return _Place(component, None, None, '', None)
+        name, position = component.local_name, time_position(component, self.wrt)
+        if block.parent_block() is None:
+            return _Place(component, None, None, name, position)
+        outer, prefix = self.split(block)
+        return _Place(component, outer, self.time(block), f'{prefix}.{name}', position)
 
     def split(self, data) -> tuple:
         """Time label of ``data`` (None if it has none) and its name with ``*`` in place of the time."""
-        time, parts = None, []
-        for one in ancestry(data):
-            component = one.parent_component()
-            name, position = component.local_name, self._position(component)
-            if component.is_indexed():
-                index = index_tuple(one.index())
-                if position is not None:
-                    time, index = index[position], _replaced(index, position, '*')
-                name += '[' + ','.join(map(str, index)) + ']'
-            parts.append(name)
-        return time, '.'.join(reversed(parts))
+        component = data.parent_component()
+        _, time, _, name, position = self._place(component)
+        if not component.is_indexed():
+            return time, name
+        index = index_tuple(data.index())
+        if position is not None:
+            time, index = index[position] if time is None else time, _replaced(index, position, '*')
+        return time, f'{name}[{",".join(map(str, index))}]'
 
     def time(self, data):
         """Time label of ``data``, or None."""
-        for one in ancestry(data):
-            position = self._position(one.parent_component())
-            if position is not None:
-                return index_tuple(one.index())[position]
-        return None
+        _, _, inner, _, position = self._place(data.parent_component())
+        return inner if position is None else index_tuple(data.index())[position]
 
     def at(self, data, label):
         """The data of the same name at another time; None if ``data`` has no time."""
         component = data.parent_component()
-        position = self._position(component)
+        position = self._place(component).position
         if position is not None:
             index = _replaced(index_tuple(data.index()), position, label)
             return component[index if len(index) > 1 else index[0]]
@@ -213,10 +238,23 @@ def _checked(wrt, block, caller):
 
 
 def derivatives(block, wrt):
-    """Yield every DerivativeVar with respect to ``wrt`` below ``block``, also after discretisation made it a plain Var."""
-    for var in block.component_objects((Var, DerivativeVar), descend_into=(Block, Disjunct)):
-        if isinstance(var, DerivativeVar) and any(s is wrt for s in var.get_continuousset_list()):
-            yield var
+    """Yield every DerivativeVar with respect to ``wrt`` below ``block``, also after discretisation made it a plain Var.
+
+    Blocks over ``wrt`` are not searched: they are many, and a derivative lies beside its state, which is over all times.
+    """
+    for place in _blocks_without_time(block, wrt):
+        for var in place.component_objects((Var, DerivativeVar), descend_into=False):
+            if isinstance(var, DerivativeVar) and any(s is wrt for s in var.get_continuousset_list()):
+                yield var
+
+
+def _blocks_without_time(block, wrt):
+    """``block`` and those below it that ``wrt`` does not index."""
+    yield block
+    for inner in block.component_objects((Block, Disjunct), descend_into=False):
+        if not is_indexed_by(inner, wrt):
+            for data in inner.values():
+                yield from _blocks_without_time(data, wrt)
 
 
 def discretised(wrt) -> bool:

@@ -6,14 +6,14 @@ Leaves: a block beside the Disjunction for each form and size, with the componen
 """
 
 from collections.abc import Callable
+from functools import cache
 from itertools import chain
 from weakref import ref
 
 from pyomo.core import Block, Constraint, Set, Var
 from pyomo.core.base.block import BlockData
-from pyomo.core.expr.visitor import replace_expressions
 
-from pyomo_fesd.core import GENERATED, index_tuple, switched_systems
+from pyomo_fesd.core import GENERATED, exchanged, index_tuple, switched_systems
 from pyomo_fesd.dcs.continuation import Continuation
 from pyomo_fesd.dcs.forms import heaviside
 from pyomo_fesd.dcs.reading import split
@@ -45,8 +45,12 @@ def blend(system, form, defined) -> Callable:
     """
     block, index = _form_block(system, form), index_tuple(system.disjunction.index())
 
-    def weight(modes):
+    @cache
+    def weight_of(modes):
         return 1.0 if len(modes) == len(system.modes) else form.weight(block, index, system, modes)
+
+    def weight(modes):
+        return weight_of(tuple(modes))
 
     if form is None:
         _impose_only_mode(block, index, system)
@@ -73,7 +77,7 @@ def _form_block(system, form):
             form.declare(block, sets, form.size(system))
         block.numbers = Set(dimen=1)
         block.mode = Constraint(*sets, block.numbers)
-    for j in range(1, 1 + _number_of_equations(system)):
+    for j in range(1 + len(block.numbers), 1 + _number_of_equations(system)):
         block.numbers.add(j)
     return block
 
@@ -164,10 +168,10 @@ def _keep_sign(copy, v):
 def _continued_body(body, defined, swap, law, i, continuation):
     """The body of an equation of an implicit mode for its copies, so that it has a solution outside of the region too."""
     if law.rest is None:
-        return continuation.law(i, replace_expressions(body, swap), law.domains)
+        return continuation.law(i, exchanged(body, swap), law.domains)
     own, rest = split(body, defined)
     # the exchange removes named expressions, so it comes before weights with hysteresis, which are some
-    return continuation.law(i, replace_expressions(own, swap), law.domains) + continuation.side(i, rest, law.rest)
+    return continuation.law(i, exchanged(own, swap), law.domains) + continuation.side(i, rest, law.rest)
 
 
 def _record_sources(block, replacement, system, sources):

@@ -20,9 +20,8 @@ from math import pi, prod
 from pyomo.core import Block, Constraint, Set, Var
 from pyomo.core.expr import cos, cosh, exp, sin, tanh
 from pyomo.core.expr.numeric_expr import DivisionExpression
-from pyomo.core.expr.visitor import replace_expressions
 
-from pyomo_fesd.core import add_positive_part, declare_positive_part, value_or_nan
+from pyomo_fesd.core import add_positive_part, declare_positive_part, exchanged, value_or_nan
 from pyomo_fesd.dcs.forms import hysteresis
 from pyomo_fesd.dcs.reading import arguments_of, factors_of
 
@@ -155,4 +154,4 @@ class Continuation:
 
 
 def _replaced(expression, laws):
-    return replace_expressions(expression, laws) if laws and hasattr(expression, 'is_expression_type') else expression
+    return exchanged(expression, laws) if laws and hasattr(expression, 'is_expression_type') else expression

@@ -2,7 +2,7 @@
 
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.common.config import ConfigDict, ConfigValue, In, document_class_CONFIG
-from pyomo.core import Transformation, TransformationFactory, Var
+from pyomo.core import Transformation, Var
 from pyomo.core.util import target_list
 
 from pyomo_fesd.core import (
@@ -35,7 +35,6 @@ def _refuse_other_than_vars(defines) -> None:
             raise FesdError(name, "fesd.dcs: 'defines' must name Vars, one or a list of them", "give m.q, or [m.q, m.p]")
 
 
-@TransformationFactory.register('fesd.dcs', doc="Time-indexed Disjunctions to a dynamic complementarity system (Filippov)")
 @document_class_CONFIG(methods=['apply_to', 'create_using'])
 class DynamicComplementaritySystem(Transformation):
     """Replace every Disjunction over time by the Filippov multipliers of its modes (theory, eq. 2-7).

@@ -14,8 +14,8 @@ The transformation reads the switched systems that other transformations recorde
 - ``given_inputs``, ``explicit_time``, ``untaken_kinks``, ``spatial_sets``, ``first_mode``: inputs, warnings and refusals
 """
 
-from pyomo_fesd.finite_elements import transformation
 from pyomo_fesd.finite_elements.equilibration import TINY
 from pyomo_fesd.finite_elements.first_mode import refuse_first_mode, refuse_first_modes
 from pyomo_fesd.finite_elements.hysteresis import LEFT, RIGHT
 from pyomo_fesd.finite_elements.lengths import LEAST
+from pyomo_fesd.finite_elements.transformation import FiniteElements

@@ -100,9 +100,11 @@ def _add_signs(moving):
 
 def _never_negative(expr, bounds):
     """Whether the bounds of the variables imply expr >= 0 for all values of mutable Params."""
+    if expr.is_variable_type():
+        return not _bound_may_change(expr) and expr.lb is not None and expr.lb >= 0
     if any(True for _ in mutable_parameters(expr)) or any(map(_bound_may_change, identify_variables(expr))):
         return False
-    low = expr.lb if expr.is_variable_type() else bounds.walk_expression(expr)[0]
+    low, _ = bounds.walk_expression(expr)
     return low is not None and low >= 0
 
 

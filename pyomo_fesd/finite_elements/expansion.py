@@ -96,8 +96,9 @@ def discretise(block: Block, wrt: ContinuousSet, shares: list[int], ncp: int, sc
 def _call_rules_again(block, wrt):
     """Call rules of Constraints again that left out an index: Pyomo treats a KeyError in a rule as Skip, and loses the equation."""
     for component in block.component_objects(Constraint, descend_into=PLACES):
-        own = is_discretisation_equation(component) or is_generated(component)
-        if is_indexed_by(component, wrt) and component.rule is not None and not own:
+        if not is_indexed_by(component, wrt) or component.rule is None or len(component) == len(component.index_set()):
+            continue
+        if not is_discretisation_equation(component) and not is_generated(component):
             for index in (i for i in component.index_set() if i not in component._data):
                 component.rule(component.parent_block(), index)
 

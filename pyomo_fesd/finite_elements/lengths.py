@@ -12,11 +12,20 @@ from collections.abc import Iterator
 
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Constraint, Expression, RangeSet, Set, Var
-from pyomo.core.expr.visitor import identify_variables, replace_expressions
+from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import FesdError, MovingGrid, TimeIndex, derivatives, homotopy_hints, is_discretisation_equation, public_name
+from pyomo_fesd.core import (
+    FesdError,
+    MovingGrid,
+    TimeIndex,
+    derivatives,
+    exchanged,
+    homotopy_hints,
+    is_discretisation_equation,
+    public_name,
+)
 
 #: The least r_n of a solution: the shortest that tolerances distinguish from zero.
 LEAST = 1e-6
@@ -108,4 +117,4 @@ def multiply_derivatives(moving: MovingGrid) -> None:
                 equation.set_value(scaled == right)
             else:
                 # IDAES and others rescale the equation before: multiply the derivative wherever it occurs
-                equation.set_value(replace_expressions(equation.expr, {id(xdot): scaled}))
+                equation.set_value(exchanged(equation.expr, {id(xdot): scaled}))

@@ -21,10 +21,9 @@ from dataclasses import replace
 
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint, Set, Var
-from pyomo.core.expr.visitor import replace_expressions
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import MovingGrid, Pair, TimeIndex, all_switched_systems, derivatives
+from pyomo_fesd.core import MovingGrid, Pair, TimeIndex, all_switched_systems, derivatives, exchanged
 from pyomo_fesd.finite_elements.algebraic_graph import rule_of
 from pyomo_fesd.finite_elements.continuity import Continuity
 from pyomo_fesd.finite_elements.relations import Relations, variables_in, variables_in_sides
@@ -85,7 +84,7 @@ class _ModeLimits:
                 if swap is None:
                     return condition
                 pair = condition.sides[element.points[0]]
-                found[element.n] = Pair(*(replace_expressions(side, swap) for side in pair))
+                found[element.n] = Pair(*(exchanged(side, swap) for side in pair))
         continuous = condition.continuous if any(condition.continuous) else (True, True)
         return replace(condition, starts=found, continuous=continuous, jumps_with_controls=(False, False), has_right_limits=True)
 
@@ -120,7 +119,7 @@ class _ModeLimits:
     def _copy_equations(self, element, equations, swap):
         component = self._moving.limits.copied
         for equation in equations:
-            component.add((element.n, self._place(element, component)), replace_expressions(equation.expr, swap))
+            component.add((element.n, self._place(element, component)), exchanged(equation.expr, swap))
 
     def _at_left(self, element, v):
         """The value of a variable right of the left boundary."""

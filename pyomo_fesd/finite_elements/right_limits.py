@@ -18,9 +18,18 @@ from dataclasses import replace
 from functools import cached_property, partial
 
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core.expr.visitor import replace_expressions
 
-from pyomo_fesd.core import Dependents, Element, MovingGrid, Pair, TimeIndex, all_switched_systems, derivatives, switched_systems
+from pyomo_fesd.core import (
+    Dependents,
+    Element,
+    MovingGrid,
+    Pair,
+    TimeIndex,
+    all_switched_systems,
+    derivatives,
+    exchanged,
+    switched_systems,
+)
 from pyomo_fesd.finite_elements.continuity import Continuity
 from pyomo_fesd.finite_elements.explicit_time import differ
 from pyomo_fesd.finite_elements.relations import Relations, variables_in, variables_in_sides
@@ -62,7 +71,7 @@ class RightLimits:
             pair = condition.sides.get(before.right)
             if pair is not None and not (element.opens_stage and any(condition.jumps_with_controls)):
                 swap = self._swap(before, variables_in_sides(pair))
-                found |= {element.n: Pair(*(replace_expressions(side, swap) for side in pair))} if swap else {}
+                found |= {element.n: Pair(*(exchanged(side, swap) for side in pair))} if swap else {}
         return replace(condition, starts=found)
 
     def condition(self, before: Element, element: Element, functions: dict):
@@ -77,7 +86,7 @@ class RightLimits:
         same = not element.opens_stage or self._same(left, right)
         right = left if same else right
         swap = self._swap(before, variables_in(right)) if self._states else {}
-        return None if same and not swap else replace_expressions(right, swap)
+        return None if same and not swap else exchanged(right, swap)
 
     def _same(self, left, right):
         """Whether two expressions contain no controls of a control stage, and have the same numbers."""
@@ -86,7 +95,7 @@ class RightLimits:
     def _of_next_stage(self, before, expr):
         """An expression of the next element at its left boundary: controls keep their new values."""
         continuous = [v for v in variables_in(expr) if self._times.time(v) is not None and self._continuous.across(v)]
-        return replace_expressions(expr, {id(v): self._times.at(v, before.right) for v in continuous})
+        return exchanged(expr, {id(v): self._times.at(v, before.right) for v in continuous})
 
     def _swap(self, before, variables):
         """id of those variables that differ after a jump -> the expression after the jump."""
@@ -111,7 +120,7 @@ class RightLimits:
             if equation not in self._done:
                 self._done.add(equation)
                 place = self._place(sum(1 for b, _ in self._jumps.copied if b == boundary) + 1)
-                self._jumps.copied.add((boundary, place), replace_expressions(equation.expr, swap))
+                self._jumps.copied.add((boundary, place), exchanged(equation.expr, swap))
 
     def _copy_dependents(self, boundary):
         """Record how the copies follow from the states after the boundary."""
@@ -121,7 +130,7 @@ class RightLimits:
             if (boundary, key) not in self._copied_dependents:
                 self._copied_dependents.add((boundary, key))
                 among = [k for k, v in enumerate(one.variables) if v in copies]
-                arguments = tuple(replace_expressions(a, swap) if hasattr(a, 'is_expression_type') else a for a in one.arguments)
+                arguments = tuple(exchanged(a, swap) if hasattr(a, 'is_expression_type') else a for a in one.arguments)
                 variables = tuple(copies[one.variables[k]] for k in among)
                 record = Dependents(variables, arguments, partial(_some, one.values, among))
                 switched_systems(self._jumps.block).dependents.append(record)

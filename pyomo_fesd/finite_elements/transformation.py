@@ -6,7 +6,7 @@ from pyomo.common.collections import ComponentSet
 from pyomo.common.config import document_class_CONFIG
 from pyomo.common.gc_manager import PauseGC
 from pyomo.common.modeling import unique_component_name
-from pyomo.core import Block, Transformation, TransformationFactory, Var
+from pyomo.core import Block, Transformation, Var
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec.complementarity import ComplementarityData
 
@@ -88,7 +88,6 @@ class _Switching:
             yield law.name, {t: (law.guards[t], *(after for _, after in resets)) for t, resets in law.resets.items()}
 
 
-@TransformationFactory.register('fesd.finite_elements', doc="Finite elements with switch detection, on top of pyomo.dae")
 @document_class_CONFIG(methods=['apply_to', 'create_using'])
 class FiniteElements(Transformation):
     """Discretise by collocation with variable element lengths h_n that find the switches (theory, eq. 9-13).

@@ -8,7 +8,7 @@ from math import inf
 from numbers import Real
 
 import numpy as np
-import pandas as pd
+from pyomo.common.dependencies import pandas as pd
 from pyomo.core import value
 from pyomo.core.base.units_container import UnitsError
 from pyomo.dae import ContinuousSet

@@ -1,9 +1,11 @@
 """The result of a refinement, and its table with a row for each round."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import pandas as pd
+from pyomo.common.dependencies import pandas as pd
 from pyomo.opt import SolverResults
 
 #: Estimated errors, each with a column.

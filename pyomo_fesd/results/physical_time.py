@@ -1,7 +1,9 @@
 """Physical time of labels and finite elements."""
 
+from __future__ import annotations
+
 import numpy as np
-import pandas as pd
+from pyomo.common.dependencies import pandas as pd
 from pyomo.core import Block
 from pyomo.dae import ContinuousSet
 

@@ -1,10 +1,11 @@
 """Plots of trajectories with element boundaries and switches."""
 
-import io
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 from pyomo.core import Block
 from pyomo.dae import ContinuousSet
 
@@ -13,15 +14,8 @@ from pyomo_fesd.results.physical_time import element_lengths, elements
 from pyomo_fesd.results.switches import switches
 from pyomo_fesd.results.trajectory import columns_over_time, rows_over_time, trajectory
 
-
-class _Figure(Figure):
-    """A Figure that shows in a notebook without pyplot."""
-
-    def _repr_png_(self) -> bytes:
-        """Return the picture; IPython calls this."""
-        picture = io.BytesIO()
-        self.savefig(picture, format='png')
-        return picture.getvalue()
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def plot(
@@ -53,7 +47,10 @@ def plot(
     names = names or _states_and_multipliers(model, wrt, columns)
     groups = [(name, _named(columns, name)) for name in names]
     boundaries = element_lengths(model, wrt)['end']
-    figure = _Figure(figsize=(7, 1 + 1.9 * len(groups)), layout='constrained')
+    # matplotlib takes longer to import than a small model to solve
+    from pyomo_fesd.results.notebook_figure import NotebookFigure
+
+    figure = NotebookFigure(figsize=(7, 1 + 1.9 * len(groups)), layout='constrained')
     axes = np.atleast_1d(figure.subplots(len(groups), 1, sharex=True))
     for axis, (name, group) in zip(axes, groups):
         for column in group:

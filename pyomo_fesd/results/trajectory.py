@@ -1,11 +1,13 @@
 """Trajectories on physical time, as columns and rows of a table."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from pyomo.common.collections import ComponentMap
+from pyomo.common.dependencies import pandas as pd
 from pyomo.core import Block, Expression, Var, value
 from pyomo.dae import ContinuousSet
 

@@ -6,6 +6,9 @@ jump.  Where these need more elements than a control stage has, the next pass ke
 
 import logging
 
+from pyomo.core import Block, Var
+from pyomo.gdp import Disjunct
+
 from pyomo_fesd.core import FesdError, moving_grids, phase
 from pyomo_fesd.finite_elements import refuse_first_mode
 from pyomo_fesd.simulation.element_solver import CUT, ElementSolver
@@ -27,7 +30,7 @@ class Simulation:
     """Element-by-element simulation on one moving grid; parameters as of ``simulate``, and a Deadline."""
 
     def __init__(self, model, wrt, inputs, options, timer, deadline):
-        self._timer = timer
+        self._model, self._timer = model, timer
         self._moving = moving_grids(model)[wrt]
         self._grid = self._moving.grid
         self._progress = Progress(wrt, self._grid.stages, deadline)
@@ -39,19 +42,30 @@ class Simulation:
         with phase(self._timer, 'begin'):
             self._solver.find_initial_values()
         refuse_first_mode(self._moving)
-        plan = self._fit_elements()
-        if equilibration_is_active(self._moving) and not self._equalise():
-            self._pass(plan)
+        self._fit_elements()
+        if equilibration_is_active(self._moving):
+            # another pass with the same plan may find other switches: it begins from other values
+            fitted, events = [(v, v.value, v.stale) for v in self._variables()], self._progress.events
+            if not self._equalise():
+                self._put_back(fitted, events)
         self._warn_of_short_intervals()
 
+    def _variables(self):
+        return self._model.component_data_objects(Var, descend_into=(Block, Disjunct))
+
+    def _put_back(self, fitted, events):
+        for v, number, stale in fitted:
+            v.set_value(number, skip_validation=True)
+            v.stale = stale
+        self._progress.events = events
+
     def _fit_elements(self):
-        """Repeat the pass until every control stage has an element for each of its switches; returns the plan."""
+        """Repeat the pass until every control stage has an element for each of its switches."""
         expected, tried = dict.fromkeys(self._grid.stages, 0), set()
         while True:
-            plan = EvenSteps(dict(expected))
-            stage = self._pass(plan)
+            stage = self._pass(EvenSteps(dict(expected)))
             if stage is None:
-                return plan
+                return
             expected[stage] = self._expected_switches(stage)
             if tuple(expected.values()) in tried:
                 raise self._too_few_elements(stage)

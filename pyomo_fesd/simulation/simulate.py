@@ -8,9 +8,11 @@ a start for ``mpec_hybrid`` with ``warm_start=True``.
 Does not apply: to systems with degrees of freedom; inputs have to be given.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 
-import pandas as pd
+from pyomo.common.dependencies import pandas as pd
 from pyomo.common.gc_manager import PauseGC
 from pyomo.common.timing import HierarchicalTimer
 from pyomo.contrib.solver.common.factory import SolverFactory

@@ -14,4 +14,4 @@ generated_blocks.py, summary.py
 Other rooms use the transformation by its registered name only.
 """
 
-from pyomo_fesd.smoothing import transformation
+from pyomo_fesd.smoothing.transformation import SmoothToComplementarity

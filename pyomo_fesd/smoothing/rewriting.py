@@ -2,6 +2,8 @@
 
 Both walks decide alike: a pattern that is replaced is entered at its z alone, any other pattern as an ordinary expression.  So the
 inner pattern of a replaced one does not count as inside a root.
+
+Pyomo takes several times longer to make a walker than to walk a constraint, so each walker is made once for all expressions.
 """
 
 from pyomo.common.numeric_types import native_types
@@ -15,28 +17,6 @@ from pyomo_fesd.smoothing.patterns import guards, match
 CLOSED = {*native_types, ne.Expr_ifExpression}
 
 
-def read_patterns(expr, replaced) -> tuple:
-    """Return the patterns of ``expr`` and the named Expressions in it.
-
-    Parameters
-    ----------
-    replaced : function (Match, guarded) -> bool
-
-    Returns
-    -------
-    list of (Match, guarded), list of (ExpressionData, guarded)
-        in the order of the expression; ``guarded``: inside an argument that is kept away from 0
-    """
-    walker = _PatternReader(replaced)
-    walker.walk_expression(expr)
-    return walker.matches, walker.named
-
-
-def replace_patterns(expr, replaced, absolute):
-    """Return ``expr`` with ``absolute(z)`` in place of the patterns for which ``replaced`` holds; both are LinearCombinations."""
-    return _expression(_PatternReplacer(replaced, absolute).walk_expression(expr))
-
-
 def _expression(result):
     return result.expression() if isinstance(result, LinearCombination) else result
 
@@ -44,8 +24,12 @@ def _expression(result):
 class _Walker(StreamBasedExpressionVisitor):
     """Track at each node whether it is inside a guarded argument, and enter replaced patterns at their z."""
 
-    def __init__(self, replaced):
+    def __init__(self):
         super().__init__()
+        self._begin(None)
+
+    def _begin(self, replaced):
+        """Prepare for another expression; ``replaced`` is a function (Match, guarded) -> bool."""
         self._replaced = replaced
         self._entered = []  # for each node above the present one: its Match if it is replaced
         self._guards = 0
@@ -90,27 +74,42 @@ class _Walker(StreamBasedExpressionVisitor):
         return node
 
 
-class _PatternReader(_Walker):
-    """Collect all patterns and named Expressions."""
+class PatternReader(_Walker):
+    """Collects all patterns and named Expressions of one expression after the other."""
 
-    def __init__(self, replaced):
-        super().__init__(replaced)
-        self.matches, self.named = [], []
+    def read(self, expr, replaced) -> tuple:
+        """Return the patterns of ``expr`` and the named Expressions in it.
+
+        Parameters
+        ----------
+        replaced : function (Match, guarded) -> bool
+
+        Returns
+        -------
+        list of (Match, guarded), list of (ExpressionData, guarded)
+            in the order of the expression; ``guarded``: inside an argument that is kept away from 0
+        """
+        self._begin(replaced)
+        self._matches, self._named = [], []
+        self.walk_expression(expr)
+        return self._matches, self._named
 
     def _takes(self, found):
-        self.matches.append((found, self._guards > 0))
+        self._matches.append((found, self._guards > 0))
         return super()._takes(found)
 
     def _meet(self, named):
-        self.named.append((named, self._guards > 0))
+        self._named.append((named, self._guards > 0))
 
 
-class _PatternReplacer(_Walker):
-    """Return each node itself where nothing below it was replaced, a LinearCombination elsewhere."""
+class PatternReplacer(_Walker):
+    """Replaces patterns: each node stays where nothing below it was replaced, and becomes a LinearCombination elsewhere."""
 
-    def __init__(self, replaced, absolute):
-        super().__init__(replaced)
+    def replace(self, expr, replaced, absolute):
+        """Return ``expr`` with ``absolute(z)`` for the patterns that ``replaced`` holds for; both are LinearCombinations."""
+        self._begin(replaced)
         self._absolute = absolute
+        return _expression(self.walk_expression(expr))
 
     def _leave(self, node, results, found):
         if found is not None:

@@ -8,7 +8,7 @@ from pyomo.dae import Integral
 from pyomo.gdp import Disjunct
 
 from pyomo_fesd.core import ancestry
-from pyomo_fesd.smoothing.rewriting import read_patterns
+from pyomo_fesd.smoothing.rewriting import PatternReader
 from pyomo_fesd.smoothing.sources import expressions
 
 
@@ -32,7 +32,7 @@ class Survey:
         self._exclude = ComponentSet(exclude)
         self._largest_eps = largest_eps * (1 + 1e-9)  # eps is a root of a square
         self._protective = protective
-        self._guarded = ComponentSet()
+        self._guarded, self._reader = ComponentSet(), PatternReader()
         self.matches = ComponentMap()
         self._guarded = _closure(self._read_all(sources))
 
@@ -48,7 +48,7 @@ class Survey:
 
     def _read(self, source):
         """The matches and the uses of named Expressions in one source; no uses where the source stays as it is."""
-        readings = [read_patterns(e, self.replaced_in(source)) for e in expressions(source)]
+        readings = [self._reader.read(e, self.replaced_in(source)) for e in expressions(source)]
         matches, uses = (list(chain.from_iterable(found)) for found in zip(*readings)) if readings else ([], [])
         return matches, [] if self._excluded(source) or _in_disjunct(source) else uses
 

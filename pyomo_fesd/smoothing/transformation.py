@@ -1,10 +1,11 @@
 """``fesd.smooth_to_complementarity``: write |z| and its smoothings exactly (theory, eq. 8)."""
 
 import logging
+from functools import partial
 
 from pyomo.common.config import Bool, ConfigDict, ConfigValue, NonNegativeFloat, document_class_CONFIG
 from pyomo.common.gc_manager import PauseGC
-from pyomo.core import Transformation, TransformationFactory
+from pyomo.core import Transformation
 from pyomo.core.base.block import BlockData
 from pyomo.core.util import target_list
 from pyomo.dae import ContinuousSet
@@ -23,7 +24,7 @@ from pyomo_fesd.core import (
 )
 from pyomo_fesd.smoothing.generated_blocks import add_to_source, last_number, source_of
 from pyomo_fesd.smoothing.linear_terms import LinearCombination
-from pyomo_fesd.smoothing.rewriting import replace_patterns
+from pyomo_fesd.smoothing.rewriting import PatternReplacer
 from pyomo_fesd.smoothing.sources import expressions, set_expressions, sources
 from pyomo_fesd.smoothing.summary import Summary
 from pyomo_fesd.smoothing.survey import Survey
@@ -36,7 +37,6 @@ def _list_of_components(arg):
     return list(arg) if isinstance(arg, (list, tuple)) else [arg]
 
 
-@TransformationFactory.register(NAME, doc="abs() and its smoothings (IDAES smooth_abs, _max, _min, _bound) to complementarity")
 @document_class_CONFIG(methods=['apply_to', 'create_using'])
 class SmoothToComplementarity(Transformation):
     """Write every absolute value, exact or smoothed, as |z| = 2 s - z, 0 <= s perp s - z >= 0 (theory, eq. 8).
@@ -134,9 +134,9 @@ def _replace_absolute_values(instance, targets, choice):
         survey = Survey(sources(instance, targets), **choice)
         reasons = [(s, [survey.reason(s, *m) for m in matches]) for s, matches in survey.matches.items()]
         _refuse_moving_elements(s for s, found in reasons if None in found)
-        summary = Summary()
+        summary, replacer = Summary(), PatternReplacer()
         for source, found in reasons:
-            _rewrite(source, found, survey.replaced_in(source), summary)
+            _rewrite(source, found, partial(replacer.replace, replaced=survey.replaced_in(source)), summary)
     return summary
 
 
@@ -156,13 +156,13 @@ def _refuse_moving_elements(changing):
                 )
 
 
-def _rewrite(source, reasons, replaced, summary):
+def _rewrite(source, reasons, replace, summary):
     """Rewrite one source, if anything in it is to be replaced."""
     for reason in filter(None, reasons):
         summary.note_left(source, reason)
     if None in reasons:
         parts = _PositiveParts(source)
-        set_expressions(source, [replace_patterns(e, replaced, parts.absolute) for e in expressions(source)])
+        set_expressions(source, [replace(e, absolute=parts.absolute) for e in expressions(source)])
         summary.note_changed(source, reasons.count(None), parts.pairs)
 
 

@@ -7,8 +7,8 @@ Read in this order: ``mpec_hybrid`` (puts the parts of ``pyomo_fesd.mpcc`` toget
 diagnostics, models that are not discretised.
 """
 
-from pyomo_fesd.solvers import casadi_ipopt
-from pyomo_fesd.solvers.mpec_hybrid import certify
+from pyomo_fesd.solvers.casadi_ipopt import CasadiIpopt, LegacyCasadiIpopt
+from pyomo_fesd.solvers.mpec_hybrid import LegacyMpecHybrid, MpecHybrid, certify
 from pyomo_fesd.solvers.simulated_start import register_simulation
 from pyomo_fesd.solvers.unready_models import refuse_unready
 from pyomo_fesd.solvers.user_names import user_names

@@ -17,7 +17,6 @@ from pyomo.common.config import ConfigDict, ConfigValue, document_class_CONFIG, 
 from pyomo.common.gc_manager import PauseGC
 from pyomo.common.tee import TeeStream, capture_output
 from pyomo.contrib.solver.common.config import SolverConfig
-from pyomo.contrib.solver.common.factory import SolverFactory
 from pyomo.contrib.solver.common.results import Results, SolutionStatus, TerminationCondition
 from pyomo.core import Block
 
@@ -78,7 +77,7 @@ class CasadiIpopt(CasadiSolver):
     writer's option ``scale_model``.
     """
 
-    CONFIG = CasadiIpoptConfig()
+    name, CONFIG = NAME, CasadiIpoptConfig()
 
     def version(self) -> tuple:
         """Version of casadi, which contains Ipopt."""
@@ -205,6 +204,3 @@ class LegacyCasadiIpopt(LegacyPlugin, CasadiIpopt):
         legacy, solution = super()._map_results(model, results)
         legacy.solver.message = results.extra_info.solver_message
         return legacy, solution
-
-
-SolverFactory.register(NAME, doc="The Ipopt in casadi's wheel: an NLP solver without an executable")(CasadiIpopt, LegacyCasadiIpopt)

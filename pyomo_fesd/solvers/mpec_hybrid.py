@@ -7,7 +7,6 @@ from pyomo.common.collections import ComponentMap
 from pyomo.common.config import document_class_CONFIG
 from pyomo.common.gc_manager import PauseGC
 from pyomo.common.timing import HierarchicalTimer
-from pyomo.contrib.solver.common.factory import SolverFactory
 from pyomo.contrib.solver.common.results import Results, SolutionStatus
 from pyomo.core import Block
 from pyomo.core.staleflag import StaleFlagManager
@@ -54,7 +53,7 @@ class MpecHybrid(CasadiSolver):
     Source: paper, section 3 and Algorithm 1.
     """
 
-    CONFIG = MpecHybridConfig()
+    name, CONFIG = NAME, MpecHybridConfig()
 
     def version(self) -> tuple:
         """Version of this package."""
@@ -125,7 +124,8 @@ class MpecHybrid(CasadiSolver):
                     compiled = record.compiled = ready.compiled
                     table.begin(compiled)
                     shared = compiled, config, config.timer, ready.deadline, ready.cache
-                    setup = Setup(*shared, table.row, reporter(config.callback, compiled, started), start.further(compiled))
+                    followed = table.row, reporter(config.callback, compiled, started)
+                    setup = Setup(*shared, *followed, start.further(compiled), start.completion(compiled))
                     solver = (Multistart if config.starts > 1 else HybridSolver)(setup)
                     record.run = solver.run
                     fill_results(results, model, solver.solve(), set_indicators, compiled, names=user_names)
@@ -139,7 +139,9 @@ class MpecHybrid(CasadiSolver):
         self._refuse_nonoptimal(results, f"{results.extra_info.outcome}. {results.extra_info.reason}")
         if loaded:
             feasible = results.solution_status in (SolutionStatus.optimal, SolutionStatus.feasible)
-            results.extra_info.warnings = review(lambda: self._review(model, record), lambda failure: [failure]) if feasible else []
+            with phase(config.timer, 'review'):
+                found = review(lambda: self._review(model, record), lambda failure: [failure]) if feasible else []
+            results.extra_info.warnings = found
         return results
 
     @staticmethod
@@ -202,11 +204,6 @@ class LegacyMpecHybrid(LegacyPlugin, MpecHybrid):
         info, optimal = results.extra_info, results.solution_status is SolutionStatus.optimal
         legacy.solver.message = info.outcome if optimal or not info.reason else f"{info.outcome}; {info.reason}"
         return legacy, solution
-
-
-SolverFactory.register(NAME, doc="Certified MPCC solutions: Reg(eps) in Ipopt and a reduced LPEC in HiGHS")(
-    MpecHybrid, LegacyMpecHybrid
-)
 
 
 def _explain(results, model, record, start):

@@ -75,6 +75,33 @@ class SimulatedStart:
         """
         return (lambda: self._values_of_simulation(compiled)) if self._further else None
 
+    def completion(self, compiled) -> Callable | None:
+        """Return a function that simulates with the controls of a point; None where no state jumps, or nothing can be simulated.
+
+        It takes an array in the units of ``compiled`` (MpccFunctions) and the seconds that it may take.  It returns the simulated
+        values, those of the array after the time at which the simulation fails; whether it is complete; and a note for the log.
+        The model is left as it was.
+        """
+        grids = list(moving_grids(self._model).values())
+        applies = self._options.simulate_first is not False and self._options.mode == 'hybrid'
+        if not applies or len(grids) != 1 or grids[0].state_jumps is None:
+            return None
+        return lambda w, seconds: self._completed(compiled, w, seconds)
+
+    def _completed(self, compiled, w, seconds):
+        before = self.note
+        self._remember()
+        for v, number in zip(compiled.variables, compiled.values(w)):
+            if not v.fixed:
+                v.set_value(float(number), skip_validation=True)
+        try:
+            complete = self._simulate("its controls simulated", True, seconds)
+            note = "its controls simulated" + " in part" * (not complete)
+            return compiled.present_values(), complete, note
+        finally:
+            self.note = before
+            self.restore()
+
     def _values_of_simulation(self, compiled) -> tuple[np.ndarray | None, str]:
         self._remember()
         try:
@@ -83,13 +110,13 @@ class SimulatedStart:
         finally:
             self.restore()
 
-    def _simulate(self, what, demanded):
+    def _simulate(self, what, demanded, seconds=None):
         """Write a simulation into the model, with a note; returns whether there is one."""
         began, left = time.perf_counter(), self._deadline.left()
         try:
             with withheld_messages('pyomo_fesd'):
-                timer, seconds = self._options.timer, None if left is None else SHARE * left
-                found = any(one(self._model, demanded, timer, seconds) for one in _registered)
+                most = seconds if left is None else min(SHARE * left, seconds or left)
+                found = any(one(self._model, demanded, self._options.timer, most) for one in _registered)
             if found:
                 self.note = f"{what} in {time.perf_counter() - began:.2f} s (simulate_first): the values are the start"
         except FesdError as error:

@@ -5,10 +5,12 @@ Leaves: values of all variables over time, and of the element lengths.
 Does not apply: to states and inputs without a column, which keep their values.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 
-import pandas as pd
 from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.common.dependencies import pandas as pd
 from pyomo.common.gc_manager import PauseGC
 from pyomo.core import Block, Var
 from pyomo.dae import ContinuousSet

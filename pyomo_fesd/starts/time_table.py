@@ -4,10 +4,12 @@ Takes: a DataFrame with physical time as its index; two rows of the same time ar
 Leaves: numbers; beyond its first and its last time a column keeps its first and its last value.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 
 import numpy as np
-import pandas as pd
+from pyomo.common.dependencies import pandas as pd
 
 from pyomo_fesd.core import FesdError
 

@@ -7,7 +7,7 @@ from pyomo.core.expr.compare import compare_expressions
 from pyomo.gdp import Disjunction
 
 from pyomo_fesd.core.errors import FesdError
-from pyomo_fesd.core.expression_key import Swap, component_key, expression_key
+from pyomo_fesd.core.expression_key import Swap, component_key, exchanged, expression_key
 
 
 @pytest.fixture
@@ -113,3 +113,10 @@ def test_a_fault_at_a_later_time_is_found():
         m = relay(lambda t: 1.0, lambda t: 1.0)
         m.relay[3].disjuncts[1].constraint[1].set_value(m.x[3] <= 2)
         pyo.TransformationFactory('fesd.dcs').apply_to(m)
+
+
+def test_exchanges_do_not_know_of_one_another(m):
+    law = m.x[0] + m.e[1]
+    assert compare_expressions(exchanged(law, {id(m.x[0]): m.x[2]}), m.x[2] + pyo.exp(m.x[1]))
+    assert compare_expressions(exchanged(law, {id(m.x[1]): m.x[3]}), m.x[0] + pyo.exp(m.x[3]))
+    assert exchanged(2.0, {}) == 2.0 and exchanged(m.x[0], {id(m.x[0]): 1.0}) == 1.0

@@ -13,16 +13,20 @@ Leaves: the components of the rules and the generated constraints; the functions
 Does not apply: where neither the component nor the arguments are over time.
 """
 
+from functools import cache
+
 from pyomo.common.numeric_types import native_types
 from pyomo.contrib.piecewise import PiecewiseLinearExpression, PiecewiseLinearFunction
 from pyomo.core import Block, Constraint, Objective
+from pyomo.core.base.expression import NamedExpressionData
 from pyomo.core.expr import Expr_ifExpression, identify_variables
+from pyomo.core.expr.base import ExpressionBase
 from pyomo.core.expr.visitor import ExpressionReplacementVisitor
 from pyomo.dae import Integral
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import FesdError, discretised, is_discretisation_equation, is_generated
+from pyomo_fesd.core import GENERATED, FesdError, discretised, is_discretisation_equation, is_generated
 from pyomo_fesd.dcs.piecewise import expr_if, multivariate, univariate
 from pyomo_fesd.dcs.piecewise.replaced_constraints import deactivate, replace_constraint
 from pyomo_fesd.dcs.piecewise.rewrite_context import RewriteContext, SharedContext
@@ -52,22 +56,18 @@ class PiecewiseRewriter:
         """Replace everything below ``blocks``."""
         for block in blocks:
             _refuse_written_by_pyomo(block, self._times)
-            self._replace_piecewise(block)
-            for source in list(_rewritable_components(block)):
+            found = _Survey(block, self._times)
+            for source in found.piecewise:
+                relation = univariate.relation(source, RewriteContext(self._shared, source, self._times.time(source)))
+                replace_constraint(source, relation, self._undo)
+            for source in found.sources:
                 if _contains(source, self._times.wrt):
                     WRITERS[source.ctype](self, source)
-            self._deactivate_functions(block)
+            self._deactivate_functions(found.functions)
         self._shared.breakpoints.warn_explicit_time()
 
-    def _replace_piecewise(self, block):
-        for source in list(block.block_data_objects(active=True, descend_into=EVERYWHERE)):
-            time = self._times.time(source) if univariate.is_piecewise(source) else None
-            if time is not None:
-                relation = univariate.relation(source, RewriteContext(self._shared, source, time))
-                replace_constraint(source, relation, self._undo)
-
-    def _deactivate_functions(self, block):
-        for function in block.component_data_objects(PiecewiseLinearFunction, active=True, descend_into=EVERYWHERE):
+    def _deactivate_functions(self, functions):
+        for function in functions:
             if any(self._time(call) is not None for call in function._expressions.values()):
                 deactivate(function, self._undo)
 
@@ -140,9 +140,41 @@ def _disjunction_variables(disjunction):
             yield from identify_variables(constraint.body)
 
 
-def _rewritable_components(block):
-    found = block.component_data_objects(tuple(WRITERS), active=True, descend_into=EVERYWHERE)
-    return (c for c in found if not is_discretisation_equation(c) and not is_generated(c))
+class _Survey:
+    """What may contain piecewise functions in a block, and in the blocks and disjuncts below it; one walk finds everything.
+
+    Attributes
+    ----------
+    piecewise : list of Piecewise over time
+    sources : list of active Constraints, Objectives and Complementarities of the user, also in other blocks, by References
+    functions : list of active PiecewiseLinearFunctions
+    """
+
+    def __init__(self, block, times):
+        self.piecewise, self.functions, sources = [], [], {}
+        for place in block.block_data_objects(active=True, descend_into=EVERYWHERE):
+            if univariate.is_piecewise(place) and times.time(place) is not None:
+                self.piecewise.append(place)
+                continue
+            generated = is_generated(place)
+            for component in place.component_map(active=True).values():
+                if component.ctype is PiecewiseLinearFunction:
+                    self.functions += _active(component)
+                elif component.ctype in WRITERS and not generated and not _is_ours(component):
+                    sources.update((id(data), data) for data in _active(component))
+        self.sources = list(sources.values())
+
+
+def _active(component):
+    """The active data of an active component."""
+    if not component.is_indexed():
+        return [component] if len(component) else []
+    return [data for data in component.values() if data.active]
+
+
+def _is_ours(component):
+    """Whether pyomo.dae or this package has written a component beside those of the user."""
+    return component.local_name.startswith(GENERATED) or is_discretisation_equation(component)
 
 
 def _contains(source, wrt):
@@ -150,11 +182,25 @@ def _contains(source, wrt):
     waiting = _complementarity_sides(source) if source.ctype is Complementarity else [source.expr]
     while waiting:
         node = waiting.pop()
-        if node.__class__ in RULES:
+        sort = _sort(node.__class__)
+        if sort is _RULE:
             return True
-        if node.__class__ not in native_types and node.is_expression_type() and not _waits(node, wrt):
+        if sort is _OPERATION or (sort is _NAMED and not _waits(node, wrt)):
             waiting.extend(node.args)
     return False
+
+
+_LEAF, _OPERATION, _NAMED, _RULE = range(4)
+
+
+@cache
+def _sort(cls):
+    """How a class of nodes is searched: this is asked for every node of every constraint."""
+    if cls in RULES:
+        return _RULE
+    if not issubclass(cls, ExpressionBase):
+        return _LEAF
+    return _NAMED if issubclass(cls, NamedExpressionData) else _OPERATION
 
 
 def _complementarity_sides(condition):

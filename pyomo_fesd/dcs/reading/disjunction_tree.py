@@ -48,7 +48,7 @@ class Mode:
 
     def constraints(self):
         """Return the active constraints: the region and the equations of the mode."""
-        return chain(*(d.component_data_objects(Constraint, active=True, descend_into=Block) for d in self.disjuncts))
+        return chain(*map(active_constraints, self.disjuncts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +73,18 @@ class DisjunctionTree:
         return chain(*(d.disjuncts for d in (self.disjunction, *self.nested)))
 
 
+def active_constraints(disjunct) -> list:
+    """Return the active constraints of a disjunct and of the Blocks in it."""
+    found = []
+    for component in disjunct.component_map().values():
+        if component.ctype is Block or (component.ctype is Constraint and component.is_indexed()):
+            return list(disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
+        if component.ctype is Constraint and component.active and len(component):
+            found.append(component)
+    # most disjuncts hold a few scalar Constraints, and there is one at every time: Pyomo's walk takes longer than all the rest
+    return found
+
+
 def enclosing_disjunct(component):
     """Return the innermost disjunct around a component, or None."""
     block = component.parent_block()
@@ -94,9 +106,9 @@ class Nesting:
 
     def __init__(self, model, times, with_hysteresis=()):
         self._times, self._with_hysteresis = times, with_hysteresis
-        self._inside = ComponentMap()
+        self._inside, self._hosts = ComponentMap(), ComponentMap()
         for disjunction in model.component_data_objects(Disjunction, active=True, descend_into=(Block, Disjunct)):
-            host = self._host(disjunction)
+            host = self._hosts[disjunction] = self._host(disjunction)
             if host is not None:
                 self._inside.setdefault(host, []).append(disjunction)
 
@@ -127,7 +139,7 @@ class Nesting:
         named = ComponentSet(chain(*(t.values() if hasattr(t, 'values') else [t] for t in named)))
         found = []
         for disjunction in disjunctions:
-            host = self._host(disjunction)
+            host = self._hosts[disjunction] if disjunction in self._hosts else self._host(disjunction)
             if host is None and self._times.time(disjunction) is not None:
                 found.append(disjunction)
             elif host is not None and disjunction in named:

@@ -24,17 +24,24 @@ REFUSED_INSIDE = {
 
 def refuse_contents(tree, modes) -> None:
     """Refuse modes with disjuncts that contain components for which there is no rule."""
-    known = ComponentSet(tree.disjuncts())
-    for disjunct in ComponentSet(d for mode in modes for d in mode.disjuncts):
-        for component in disjunct.component_objects(descend_into=Block):
+    disjuncts = {id(d): d for mode in modes for d in mode.disjuncts}
+    for disjunct in disjuncts.values():
+        for component in _components(disjunct):
             if isinstance(component, DerivativeVar):
                 raise FesdError(component, "a DerivativeVar inside a disjunct", "declare it on the block that holds its state")
             if component.ctype in REFUSED_INSIDE and component.active:
-                _refuse_active(disjunct, component, known)
+                _refuse_active(disjunct, component, tree)
 
 
-def _refuse_active(disjunct, component, known):
+def _components(disjunct):
+    """The components of a disjunct and of the Blocks in it."""
+    direct = list(disjunct.component_map().values())
+    return disjunct.component_objects(descend_into=Block) if any(c.ctype is Block for c in direct) else direct
+
+
+def _refuse_active(disjunct, component, tree):
     cause, fix = REFUSED_INSIDE[component.ctype]
+    known = ComponentSet(tree.disjuncts())
     for inside in component.values():
         if inside.active and inside not in known:
             raise FesdError(disjunct, cause.format(inside.name), fix)

@@ -80,7 +80,7 @@ class SystemReader:
         counts = tuple(map(len, equalities)), tuple(map(len, inequalities))
         key, parts = expression_key(
             [con.expr for con in chain(*equalities, *inequalities)],
-            lambda v: (self._variables.is_derivative(v), self._variables.is_state(v), v.lb, v.ub),
+            lambda v: (*self._variables.kind(v), v.lb, v.ub),
         )
         self._refuse_foreign(tree, modes, [*equalities, *inequalities], parts)
         if (counts, key) in self._read:
@@ -131,5 +131,5 @@ class SystemReader:
 
 def _split_constraints(modes):
     """The equalities and the inequalities of each mode."""
-    constraints = [list(mode.constraints()) for mode in modes]
-    return [[c for c in cons if c.equality] for cons in constraints], [[c for c in cons if not c.equality] for cons in constraints]
+    constraints = [[(c, c.equality) for c in mode.constraints()] for mode in modes]
+    return tuple([[c for c, equality in cons if equality is wanted] for cons in constraints] for wanted in (True, False))

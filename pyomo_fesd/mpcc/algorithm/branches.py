@@ -48,12 +48,16 @@ class Branches:
         of the homotopy: a point far above the objective that it promises is not worth a descent
     global_lpec : bool
         whether a full LPEC searches beyond the bi-active pairs for a better branch (option ``lpec='full'``)
+    patient : bool
+        whether the first attempt at a branch, too, has the iterations of the second one: where points can be completed, branches
+        are worth more than further relaxations
     """
 
-    def __init__(self, subsolves, gap, global_lpec):
+    def __init__(self, subsolves, gap, global_lpec, patient=False):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
         self._attempts, self._solved, self._exhausted = Counter(), {}, {}
+        self._first = SECOND if patient else FIRST
 
     # called by the algorithm
 
@@ -95,7 +99,7 @@ class Branches:
             if zero is not None and not self.tried(zero):
                 start = point.w.copy()
                 start[neighbour.starts] = neighbour.at
-                self._widen_from(self.improve_from(self._point(start, zero, None, True), False))
+                self._widen_from(self.improve_from(self._point(start, zero, None, True, below=point.f), False))
                 if self.run.point.f < point.f - PROGRESS * max(1.0, abs(point.f)):
                     neighbours = list(self._c.neighbours)
 
@@ -107,7 +111,7 @@ class Branches:
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for neighbour in self._c.neighbours:
             zero = self._zero_sides(point, neighbour) if neighbour.short.size else None
-            found = None if zero is None else self.certified(point.w, zero, max_iter=SECOND)
+            found = None if zero is None else self.certified(point.w, zero, max_iter=SECOND, below=point.f)
             if _is_below(found, enough):
                 return found
         return None
@@ -257,7 +261,7 @@ class Branches:
             if not step.solved or step.descent == 0.0:
                 return None
             reach = radius * np.maximum(1.0, np.abs(w))
-            better = self.certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=FIRST)
+            better = self.certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=self._first)
         return better if _is_below(better, enough) or _settles(better, point) else None
 
     def _beyond(self, point, enough, tolerance, clear):
@@ -271,7 +275,7 @@ class Branches:
         better = self._point(point.w + step.d, step.zero, None, False)
         return better if _is_below(better, enough) else None
 
-    def _point(self, w, zero, duals, final):
+    def _point(self, w, zero, duals, final, **more):
         """The solution of branch ``zero``, certified; None if it has none.
 
         A branch that was solved is not solved again; one that failed is tried once more, without multipliers.
@@ -279,22 +283,23 @@ class Branches:
         if self.tried(zero):
             return None
         key = zero.tobytes()
-        self._attempts[key] += 1
-        last = self._attempts[key] == TRIES
+        # without multipliers and with all iterations a second attempt is no other one
+        self._attempts[key] += TRIES if final and duals is None else 1
+        last = self._attempts[key] >= TRIES
         duals = None if last else duals
-        point = self.certified(w, zero, duals=duals, max_iter=SECOND if final or last else FIRST)
+        point = self.certified(w, zero, duals=duals, max_iter=SECOND if final or last else self._first, **more)
         if point is None and final and duals is not None:
-            point = self.certified(w, zero, duals=None)
+            point = self.certified(w, zero, duals=None, **more)
         if point is not None and point.certificate.grade is not Stationarity.DESCENT:
             self._attempts[key], self._solved[key] = TRIES, point.f
         return point
 
-    def certified(self, w, zero, duals=None, **more):
-        """The certified solution of a branch; None if it has none."""
-        solved, equal = self._solve(w, zero, duals, **more)
+    def certified(self, w, zero, duals=None, below=np.inf, **more):
+        """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one."""
+        solved, equal = self._solve(w, zero, duals, below, **more)
         if solved is not None and not solved.solved and more.get('max_iter') in MORE:
             # feasible, so the branch has a solution, but not at its minimum yet
-            solved, equal = self._solve(solved.w, zero, solved, **more | {'max_iter': MORE[more['max_iter']]})
+            solved, equal = self._solve(solved.w, zero, solved, below, **more | {'max_iter': MORE[more['max_iter']]})
         if solved is None:
             return None
         f = self._c.evaluate(solved.w).f
@@ -305,21 +310,34 @@ class Branches:
         certificate = self._subsolves.certify(solved, equal)
         return Point(solved, f, certificate, equal) if certificate.feasible else None
 
-    def _solve(self, w, zero, duals, **more):
+    def _solve(self, w, zero, duals, below, **more):
         """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force."""
-        return self.decided(self._subsolves.branch(w, zero, None, 1.0, duals=duals, **more), zero, **more)
+        first = self._subsolves.branch(w, zero, None, 1.0, duals=duals, **more)
+        if first is not None and first.solved and self._c.evaluate(first.w).f > below + AS_GOOD * max(1.0, abs(below)):
+            return None, None
+        return self.decided(first, zero, **more)
 
     def decided(self, first, zero, apart=False, **more):
         """The second NLP, after the solution ``first`` of a branch, and the decisions in force; none of ``apart``."""
-        c = self._c
-        if first is None or not c.eta.numel():
+        if first is None or not self._c.eta.numel():
             return first, None
-        equal = (c.evaluate(first.w).eta > self._tolerances.eta) & ~np.asarray(apart)
-        second = self._subsolves.branch(first.w, zero, equal, 0.0, duals=first, **more)
-        if second is None and np.any(equal & c.tentative):
-            equal = equal & ~c.tentative
-            second = self._subsolves.branch(first.w, zero, equal, 0.0, duals=first, **more)
-        return second, equal
+        return self._imposed(first.w, zero, ~np.asarray(apart), duals=first, **more)
+
+    def beside(self, w):
+        """The solution of the branch that ``w`` names with the decisions that are in force there, and these; None if it has none.
+
+        ``w`` is exactly complementary, and its decisions hold.
+        """
+        return self._imposed(w, self._subsolves.sets(w, self._tolerances.biactive).zero, True)
+
+    def _imposed(self, w, zero, among, **more):
+        """A branch NLP from ``w`` with the decisions that its eta asks for, ``among`` some; a tentative one only if it can be."""
+        equal = (self._c.evaluate(w).eta > self._tolerances.eta) & among
+        solved = self._subsolves.branch(w, zero, equal, 0.0, **more)
+        if solved is None and np.any(equal & self._c.tentative):
+            equal = equal & ~self._c.tentative
+            solved = self._subsolves.branch(w, zero, equal, 0.0, **more)
+        return solved, equal
 
 
 def _settles(better, point):

@@ -130,8 +130,7 @@ class Coincidences:
             start, equal = self._beside(point, way)
             if start in (SETTLED, OPEN):
                 return start
-            if self._c.evaluate(start.w).f > point.f + AS_GOOD * max(1.0, abs(point.f)):
-                # another solution that does not meet the incumbent
+            if self._is_above(point, start):
                 return SETTLED
             gamma = np.zeros(len(way.zero), dtype=bool)
             gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
@@ -150,12 +149,18 @@ class Coincidences:
         first = self._subsolves.attempt(start, zero, None, 1.0, **more)
         if first is None or first.status in INFEASIBLE:
             return SETTLED, None
+        if first.solved and self._is_above(point, first):
+            return SETTLED, None
         apart = self._decides(point.w, way.extents)
         solved, equal = self._branches.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
         if first.solved and (solved is None or not solved.solved):
             # without decisions there is more room: an order that does not descend then does not descend with them
             solved, equal = self._subsolves.attempt(first.w, zero, None, 0.0, **more), np.zeros_like(apart)
         return (solved, equal) if solved is not None and solved.solved else (OPEN, None)
+
+    def _is_above(self, point, other):
+        """Whether another solution does not meet the incumbent."""
+        return self._c.evaluate(other.w).f > point.f + AS_GOOD * max(1.0, abs(point.f))
 
     def _decides(self, w, variables):
         """The decisions that involve variables: beside a place of extent zero nothing is decided, as changes lie on both sides."""

@@ -7,6 +7,7 @@ it descends into better branches (``Branches``).
 from pyomo_fesd.core import DeferredInterrupt, interrupt_handled
 from pyomo_fesd.mpcc.algorithm.branches import Branches
 from pyomo_fesd.mpcc.algorithm.coincidences import Coincidences
+from pyomo_fesd.mpcc.algorithm.completions import Completions
 from pyomo_fesd.mpcc.algorithm.feasible_start import feasible_start
 from pyomo_fesd.mpcc.algorithm.gap_test import GapTest
 from pyomo_fesd.mpcc.algorithm.homotopy import Homotopy
@@ -43,7 +44,8 @@ class HybridSolver:
         self._setup, self._c, self._options, self.run = setup, setup.compiled, setup.options, Run()
         self._subsolves = Subsolves(setup, Tolerances.of(self._options), self.run)
         self._gap = GapTest(self._options.gap_tol * 1e-2, self._options.gap_tol)
-        self._branches = Branches(self._subsolves, self._gap, GLOBAL_LPEC_SEARCH[self._options.lpec](self._c))
+        search, patient = GLOBAL_LPEC_SEARCH[self._options.lpec](self._c), setup.complete is not None
+        self._branches = Branches(self._subsolves, self._gap, search, patient)
         self._coincidences = Coincidences(self._subsolves, self._branches)
 
     def solve(self) -> Run:
@@ -76,7 +78,9 @@ class HybridSolver:
         if self._starts_at_a_solution():
             return Outcome.SOLVED
         if not (self._options.warm_start and self._from_values()):
-            self._follow_path()
+            self._complete()
+            if self.run.point is None:
+                self._follow_path()
             if self.run.point is not None and self._c.has_objective:
                 self._branches.try_neighbours()
         if self.run.point is None:
@@ -98,6 +102,11 @@ class HybridSolver:
             self._coincidences.settle()
             if self.run.point is before:
                 return
+
+    def _complete(self):
+        """Rounds of relaxation, completion and branch, where points can be completed and something is to be minimised."""
+        if self._setup.complete is not None and self._c.has_objective:
+            Completions(self._setup, self._subsolves, self._branches).follow(self._c.x0)
 
     def _follow_path(self):
         """The homotopy from the start; where it finds no feasible point, from a further start."""

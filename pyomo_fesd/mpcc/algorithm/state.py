@@ -48,6 +48,9 @@ class Setup:
         called with the Run after every outer iteration; may raise Stop
     further_start : callable or None
         returns another start (array), or None, and a note for the log; called once where the homotopy finds no feasible point
+    complete : callable or None
+        takes a point (array) and the seconds that it may take; returns a point with the same values of the free variables, at which
+        all other variables solve equations and pairs, whether that was possible for all of them, and a note for the log
     """
 
     compiled: object
@@ -58,6 +61,7 @@ class Setup:
     show: Callable
     after: Callable
     further_start: Optional[Callable] = None
+    complete: Optional[Callable] = None
 
 
 @dataclass(frozen=True)

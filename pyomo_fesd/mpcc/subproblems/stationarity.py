@@ -22,6 +22,7 @@ class Stationarity(Enum):
     LIMITED = "not certified: descent is only stopped by a bound of the method (guide bounds); try another discretisation or start"
     OPEN = "not certified: changes coincide, and not every order of them could be tested; try another discretisation or start"
     RELAXED = "not certified: mode='relaxation' asks for no certificate"
+    UNTRIED = "not certified: the run ended before a certificate could be tried"
     UNSOLVED = "not certified: HiGHS did not solve the LPEC"
     INFEASIBLE = "not certified: the point is not feasible"
 

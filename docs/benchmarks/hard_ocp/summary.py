@@ -1,0 +1,76 @@
+"""Table and picture of the study of hard optimal control problems, from its rows."""
+
+import pandas as pd
+from benchmarks.hard_ocp.cases import PROBLEMS
+from matplotlib.figure import Figure
+
+#: Marker and colour of each method.
+METHODS = {
+    'contact': {'marker': 'o', 'color': '0.15'},
+    'time_freezing': {'marker': 's', 'color': '0.5'},
+    'nosnoc': {'marker': 'x', 'color': 'tab:red'},
+}
+#: What a problem asks for beyond its cost is met to this accuracy in the replay.
+MET = 0.05
+
+
+def summary(rows):
+    """One row for each problem and method: medians over the seeds, numbers of runs, and ratios to nosnoc."""
+    rows = rows.assign(answered=rows.objective.notna(), certified=rows.certified.eq(True), met=rows.missed.le(MET))
+    groups = rows.groupby(['problem', 'method'])
+    table = groups.agg(
+        runs=('seed', 'size'),
+        answers=('answered', 'sum'),
+        certified=('certified', 'sum'),
+        met=('met', 'sum'),
+        objective=('objective', 'median'),
+        replayed=('replayed', 'median'),
+        best=('replayed', 'min'),
+        missed=('missed', 'median'),
+        impacts=('impacts', 'median'),
+        iterations=('iterations', 'median'),
+        cpu=('cpu', 'median'),
+    )
+    table['success'] = rows[rows.status.isin(['optimal', 'SUCCESS'])].groupby(['problem', 'method']).size()
+    table['success'] = table['success'].fillna(0).astype(int)
+    theirs = (
+        table.cpu.xs('nosnoc', level='method') if 'nosnoc' in table.index.get_level_values('method') else pd.Series(dtype=float)
+    )
+    table['cpu / nosnoc'] = table.cpu / theirs.reindex(table.index.get_level_values('problem')).to_numpy()
+    table = table.reindex(pd.MultiIndex.from_product([PROBLEMS, METHODS], names=table.index.names)).dropna(how='all')
+    return table.map(lambda value: float(f'{value:.4g}') if isinstance(value, float) else value)
+
+
+def failures(rows):
+    """The runs that are not certified (ours) or not SUCCESS (nosnoc), or whose replay misses what the problem asks for."""
+    good = rows.certified.eq(True) | rows.status.eq('SUCCESS')
+    bad = rows[~good | ~rows.missed.le(MET)]
+    return bad[['problem', 'method', 'seed', 'status', 'objective', 'replayed', 'missed', 'cpu']]
+
+
+def draw(rows):
+    """CPU seconds and replayed cost of each run."""
+    figure = Figure(figsize=(9, 4), layout='constrained')
+    for axis, column, label in zip(figure.subplots(1, 2), ('cpu', 'replayed'), ('CPU seconds', 'cost of the replayed controls')):
+        for k, (method, style) in enumerate(METHODS.items()):
+            part = rows[rows.method == method]
+            places = [PROBLEMS.index(problem) + 0.22 * (k - 1) for problem in part.problem]
+            axis.scatter(part[column], places, label=method, alpha=0.8, **style)
+        axis.set_yticks(range(len(PROBLEMS)), PROBLEMS)
+        axis.invert_yaxis()
+        axis.set_xscale('log')
+        axis.set_xlabel(label)
+        axis.grid(axis='x', color='0.9')
+        axis.spines[['top', 'right']].set_visible(False)
+    figure.axes[0].legend()
+    return figure
+
+
+def write(folder):
+    """Print and write the tables and the picture of the rows in ``folder``."""
+    rows = pd.read_csv(folder / 'rows.csv')
+    table = summary(rows)
+    table.to_csv(folder / 'summary.csv')
+    failures(rows).to_csv(folder / 'failures.csv', index=False)
+    print(table.to_string())
+    draw(rows).savefig(folder / 'summary.png', dpi=150)

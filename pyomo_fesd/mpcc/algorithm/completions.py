@@ -1,0 +1,129 @@
+"""Rounds of relaxation, completion and branch, for problems in which a relaxation rarely names a branch that has a solution.
+
+Reg(eps) finds good values of the free variables, but where many pairs change sides at once its active sets are those of no branch.
+A completion keeps the free variables of a relaxation and solves the equations and pairs for all others: an exactly complementary
+point, which names its branch.  From the solution of this branch NLP the next relaxation starts.  First eps falls as in the
+homotopy; then relaxations around the best point lead to better ones, until they no longer do (theory, section 4).
+"""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from pyomo_fesd.mpcc.algorithm.state import Point
+from pyomo_fesd.mpcc.nlp import NlpResult
+from pyomo_fesd.mpcc.subproblems import Stationarity
+
+#: Smallest eps of a relaxation that is worth a completion, and the eps of those around the best point.
+LAST, AROUND = 1e-3, (1e-1, 1e-2)
+#: Times that relaxations go around the best point at most, and the part by which its objective must fall to go on.
+CYCLES, PROGRESS = 6, 1e-3
+#: First eps of a second path, relative to that of the first; it is followed where the relaxations around the best point have an
+#: objective that is smaller by this part.
+LOOSER, GAP = 10.0, 0.5
+#: Part of the time limit after which no further round begins: the best point is certified in the rest.
+SHARE = 0.6
+#: A completion may take this many times as long as the relaxation before, and at least these seconds.
+LONGER, LEAST_TIME = 2.0, 2.0
+#: Products of eps carry round-off.
+ROUND_OFF = 1.001
+
+
+class Completions:
+    """The rounds of one run.
+
+    Parameters
+    ----------
+    setup : Setup
+        with ``complete``
+    subsolves : Subsolves
+    branches : Branches
+    """
+
+    def __init__(self, setup, subsolves, branches):
+        self._c, self._options, self._complete, self._after = setup.compiled, setup.options, setup.complete, setup.after
+        self._subsolves, self._branches, self.run = subsolves, branches, subsolves.run
+        self._form = 'scholtes' if self._options.relaxation == 'auto' else self._options.relaxation
+        self._deadline, self._promise = setup.deadline.part(SHARE), -np.inf
+
+    def follow(self, start):
+        """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
+        for eps in (self._options.eps_init, self._options.eps_init * LOOSER):
+            self._down(start, eps)
+            self._improve()
+            if not self._promising() or self._deadline.expired():
+                break
+        if self.run.point is not None:
+            self._certify()
+
+    def _down(self, w, eps):
+        """Rounds with ever smaller eps, each from the relaxation before."""
+        while eps * ROUND_OFF >= max(LAST, self._options.eps_final) and not self._deadline.expired():
+            w = self._round(w, eps)
+            eps *= self._options.eps_factor
+
+    def _improve(self):
+        """Rounds around the best point, until they no longer find a much better one."""
+        for _ in range(CYCLES):
+            before = self.run.point
+            if before is None:
+                return
+            for eps in AROUND:
+                if self._deadline.expired():
+                    return
+                self._round(self.run.point.w, eps)
+            if not self.run.point.f < before.f - PROGRESS * max(1.0, abs(before.f)):
+                return
+
+    def _promising(self):
+        """Whether the relaxations promise a much better point than the best one."""
+        point = self.run.point
+        return point is None or point.f - self._promise > GAP * abs(point.f)
+
+    def _round(self, w, eps):
+        """One relaxation from ``w``, and the branch of its completion; returns the relaxation's point."""
+        self.run.eps = eps
+        began = time.perf_counter()
+        relaxed = self._subsolves.relax(self._form, w, eps, None, self._options.relaxation_iterations)
+        self._subsolves.keep_least_infeasible(relaxed.w)
+        if eps <= AROUND[0] * ROUND_OFF and self._subsolves.usable(relaxed):
+            self._promise = self._c.evaluate(relaxed.w).f
+        seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
+        narrow = self._c.widen()
+        try:
+            self._branch_of_completion(relaxed.w, seconds)
+        finally:
+            if narrow:
+                self._c.narrow()
+        self._after(self.run)
+        return relaxed.w
+
+    def _branch_of_completion(self, w, seconds):
+        """Solve the branch that the completion of ``w`` names."""
+        completed, is_complete, note = self._complete(w, seconds)
+        self._subsolves.note(note, completed)
+        if is_complete:
+            self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
+        solved, equal = self._branches.beside(completed)
+        if solved is not None:
+            self._keep(solved, equal)
+
+    def _keep(self, solved, equal=None):
+        """Keep a feasible point that is better than the best so far; its certificate comes at the end."""
+        f, best = self._c.evaluate(solved.w).f, self.run.point
+        if best is not None and f >= best.f:
+            return
+        certificate = self._subsolves.measure(solved.w)
+        if certificate.feasible:
+            self.run.point = Point(solved, f, replace(certificate, grade=Stationarity.UNTRIED), equal)
+
+    def _certify(self):
+        """The certificate of the best point, and descent from it."""
+        best = self.run.point
+        self._c.widen()
+        if best.equal is None:
+            self._branches.explore_from(best.w, True)
+        else:
+            self.run.point = replace(best, certificate=self._subsolves.certify(best.nlp, best.equal))
+            self._branches.improve_from(self.run.point, True)
