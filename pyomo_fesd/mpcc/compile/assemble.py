@@ -150,7 +150,8 @@ class _Assembly:
         sides, plain = self._of_expressions(self._rows.sides, factors.x)[: 2 * self._q], self._rows.plain
         given = self._factors.of([c.source for c in self._rows.conditions] * 2)
         sides = side_factors(sides, given)
-        sides[plain >= 0] = factors.x[plain[plain >= 0]]
+        of_variables = np.concatenate([factors.x, np.ones(len(self._p))])
+        sides[plain >= 0] = of_variables[plain[plain >= 0]]
         return Scale(factors.x, factors.g, factors.f, sides, factors.offset)
 
     def _of_expressions(self, functions, s_x):
@@ -175,7 +176,8 @@ class _Assembly:
 
     def _model_values(self, s_x):
         guides, sides = self._problem.hints.guide_bounds, np.zeros(len(self._variables), dtype=bool)
-        sides[self._rows.plain[self._rows.plain >= 0]] = True
+        plain = self._rows.plain
+        sides[plain[(plain >= 0) & (plain < len(sides))]] = True
         guide = np.array([guides.get(v.parent_component(), UNBOUNDED) for v in self._variables], dtype=float).reshape(-1, 2)
         return ModelValues(self._variables, self._parameters, sides, guide, s_x, self._rows.splits)
 

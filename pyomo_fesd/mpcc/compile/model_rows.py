@@ -32,7 +32,8 @@ class ModelRows:
         sizes of the terms of fixed values that cancel in small constants of rows and sides, else 0
     conditions : list of Condition (q)
     side_of : int array (2q), equal numbers for equal sides
-    plain : int array (2q), the variable that a side is, -1 for others
+    plain : int array (2q)
+        the variable that a side is, n + k for the parameter k, -1 for others
     splits : list, as in ``ModelValues``
     cost, rows, sides, others : RowFunctions of the variables and the parameters
         f and penalty; g; G, H and the decisions' equations; eta and gauges

@@ -167,3 +167,14 @@ def test_the_parts_of_a_solve_agree_in_symbols_of_both_kinds():
             pyo.SolverFactory('mpec_hybrid').solve(m)
         ends.append([v.value for v in m.component_data_objects(pyo.Var)])
     np.testing.assert_allclose(*ends, atol=1e-7)
+
+
+def test_a_side_that_is_a_parameter_keeps_its_unit():
+    m = small_mpccs.pair(1.0, 0.0)
+    m.f = pyo.Objective(expr=(m.y - 1) ** 2)
+    m.given = pyo.Var(initialize=0.0, bounds=(0, None))
+    m.given.fix()
+    m.c2 = Complementarity(expr=complements(m.given >= 0, m.y >= 0))
+    c = compiled(m, [m.given])
+    assert c.pairs == 2
+    np.testing.assert_array_equal(c.scale.sides, np.ones(4))
