@@ -12,6 +12,7 @@ Does not apply: to singularity that numbers alone cause (two parallel equations)
 
 import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 
@@ -55,6 +56,9 @@ class Structure:
         equations left over, one choice of them
     overdetermined : list of ConstraintData and ComplementarityData
         all among which that choice can be made
+    outside : list of ConstraintData
+        active equations elsewhere in the model that contain unknowns of the block, such as the streams of a flowsheet whose Arcs
+        lie above it; not counted
     """
 
     block: str
@@ -65,6 +69,7 @@ class Structure:
     undetermined: list
     surplus: list
     overdetermined: list
+    outside: list
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -79,11 +84,20 @@ class Structure:
             parts.append(_sentence('equation(s) too many', self.surplus, self.overdetermined))
         if self.loose and (self.surplus or not self.has_objective):
             parts.append(_sentence('unknown(s) that nothing determines', self.loose, self.undetermined))
+        if parts and self.outside:
+            parts.append(self._outside())
         return '; '.join(parts)
+
+    def _outside(self):
+        return (
+            f"{len(self.outside)} active equation(s) outside '{self.block}' contain its unknowns and are not counted, e.g. "
+            + _few([c.name for c in self.outside], len(self.outside))
+        )
 
     def __str__(self):
         head = f"{self.block}: {self.unknowns} unknowns, {self.equations} equations, degrees of freedom {self.degrees_of_freedom}"
-        return f"{head}\n{self.problem or 'structurally sound'}"
+        more = f"\n{self._outside()}" if self.outside and not self.problem else ''
+        return f"{head}\n{self.problem or 'structurally sound'}{more}"
 
     __repr__ = __str__
 
@@ -97,19 +111,30 @@ def structure(block) -> Structure:
         prints as two lines; ``problem`` is empty for a sound model
     """
     refuse_no_model(block, 'structure')
-    given = _Given(block)
+    given = Given(block)
     unknowns, equations, rows = ComponentMap(), [], []
-    for equation, expressions in _equations(block, given):
+    for equation, expressions in equations_of(block, given):
         found = [v for v in ComponentSet(chain(*map(_incident_variables, expressions))) if v not in given]
         if found or _contradicts(equation):
             equations.append(equation)
             rows.append([unknowns.setdefault(v, len(unknowns)) for v in found])
     has_objective = any(True for _ in block.component_data_objects(Objective, active=True, descend_into=Block))
     faults = _faults(_incidence(rows, len(unknowns)), equations, list(unknowns))
-    return Structure(_name(block), len(unknowns), len(equations), has_objective, *faults)
+    return Structure(_name(block), len(unknowns), len(equations), has_objective, *faults, _outside(block, unknowns, given))
 
 
-class _Given:
+def _outside(block, unknowns, given):
+    """The active equations of the model that do not lie in ``block`` and contain its unknowns."""
+    model = block.model()
+    if block is model:
+        return []
+    inside = ComponentSet(block.component_data_objects(Constraint, active=True, descend_into=Block))
+    others = (c for c in model.component_data_objects(Constraint, active=True, descend_into=Block) if c not in inside)
+    own = (c for c in others if c.equality and c not in given)
+    return [c for c in own if any(v in unknowns for v in identify_variables(c.body, include_fixed=False))]
+
+
+class Given:
     """Variables and equations that movable elements determine, and not the plant.
 
     These are all components on the blocks of moving grids, the weights of modes with hysteresis, and with Gauss points the data at
@@ -135,7 +160,7 @@ class _Given:
         return component in self._own or any(times.time(component) in labels for times, labels in self._between)
 
 
-def _equations(block, given):
+def equations_of(block, given) -> Iterator[tuple]:
     """Yield ``(component, expressions)`` for every equality and pair of the plant; pairs that are summed up count one by one."""
     for c in block.component_data_objects(Constraint, active=True, descend_into=Block):
         if c.equality and c not in given:
@@ -144,7 +169,7 @@ def _equations(block, given):
     for c in block.component_data_objects(Complementarity, descend_into=Block):
         counts = c.active or c in given.summed or any(moving.source(c) in given.summed for moving in grids)
         if counts and c not in given and not any(c in moving.splits for moving in grids):
-            yield c, _pair_sides(c)
+            yield c, pair_sides(c)
 
 
 def _contradicts(equation):
@@ -154,7 +179,8 @@ def _contradicts(equation):
     return abs(value(equation.body) - value(equation.upper)) > CONTRADICTION
 
 
-def _pair_sides(condition):
+def pair_sides(condition) -> list:
+    """Return the sides G and H of a pair."""
     return [e for e in read_complementarity(condition) if e is not None]
 
 

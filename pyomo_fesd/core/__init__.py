@@ -1,20 +1,26 @@
 """Concepts that all rooms share: errors, time in an index, grids, complementarity, expression keys, and the three records.
 
 Read first ``errors``, ``time_index``, ``grid`` and ``complementarity``, then the records: ``switched_systems`` (which
-components switch; written before discretisation), ``moving_grid`` with ``boundary_laws`` (elements of variable length; written
-by ``fesd.finite_elements``) and ``homotopy_hints`` (for the solver; no time in it).  ``private_data`` keeps them on blocks,
-``generated`` recognises generated blocks, ``keywords`` refuses values outside of their domains, ``renamed`` words of earlier
-versions, ``rollback`` undoes what was left half
-done, ``interruption`` lets Ctrl-C wait where something would be, ``withheld_messages`` keeps back the messages of one thread,
-``turns`` lets threads wait for one another.  ``evaluation``, ``gradient``, ``interpolation``, ``positive_part``,
-``step``, ``smallest``,
-``expression_key`` and ``phase`` are tools.  This room imports from no other.
+components switch; written before discretisation), ``moving_grid`` with ``boundary_laws`` and ``instants`` (elements of variable
+length; written by ``fesd.finite_elements``) and ``homotopy_hints`` (for the solver; no time in it).  ``private_data`` keeps them
+on blocks, ``generated`` recognises generated blocks, ``keywords`` refuses values outside of their domains, ``renamed`` words of
+earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait where something would be,
+``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
+``evaluation``, ``gradient``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``expression_key`` and ``phase`` are
+tools.  This room imports from no other.
 """
 
 from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
 from pyomo_fesd.core.complementarity import Mixed, Pair, distance_to_bound, read_complementarity, read_side
 from pyomo_fesd.core.errors import FesdError
-from pyomo_fesd.core.evaluation import kept_values, known_sign, mutable_parameters, value_or_nan, value_or_zero
+from pyomo_fesd.core.evaluation import (
+    kept_values,
+    known_sign,
+    mutable_parameters,
+    value_or_nan,
+    value_or_zero,
+    variables_that_count,
+)
 from pyomo_fesd.core.expression_key import Swap, component_key, exchanged, expression_key, prefix_tokens
 from pyomo_fesd.core.generated import GENERATED, is_generated, public_name, source_name
 from pyomo_fesd.core.gradient import gradient
@@ -32,6 +38,7 @@ from pyomo_fesd.core.homotopy_hints import (
     BranchConstraint,
     Change,
     Coincidence,
+    Filling,
     Follower,
     HomotopyHints,
     NeighbourBranch,
@@ -42,6 +49,7 @@ from pyomo_fesd.core.homotopy_hints import (
     all_hints,
     homotopy_hints,
 )
+from pyomo_fesd.core.instants import Instant
 from pyomo_fesd.core.interpolation import interpolation_weights
 from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible
 from pyomo_fesd.core.keywords import check_keywords, read_keywords

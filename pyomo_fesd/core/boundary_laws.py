@@ -4,7 +4,7 @@ from collections.abc import Container
 from dataclasses import dataclass
 
 from pyomo.common.collections import ComponentMap
-from pyomo.core import Block, Constraint, Expression, Var
+from pyomo.core import Block, Constraint, Expression, Var, value
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core.complementarity import Pair
@@ -93,9 +93,25 @@ class Impacts:
         """Return the law of restitution at boundary ``b`` for each of the ``closed`` contacts, 0 <= Lambda perp P >= 0."""
         return [Pair(v, self.above[v.index()]) for v in _at(self.impulse, b, closed)]
 
+    def set_parts(self, name: str, b: int) -> None:
+        """Set P, N and Q of a contact at boundary ``b`` from the velocities there, with the least N."""
+        index = name, b
+        variables = [some[index] for some in (self.above, self.below, self.leaving) if index in some]
+        for v in variables:
+            v.set_value(0.0)
+        # at the first time the second row is no equation of these parts
+        rates = [value(self.parts[(*index, k)].body) for k in range(1, len(variables))]
+        N = max(0.0, *(-rate for rate in rates))
+        for v, number in zip(variables, (rates[0] + N, N, rates[-1] + N)):
+            v.set_value(number)
+
     def slip_pairs(self, b: int) -> list:
         """Return the pairs of friction impulses at boundary ``b``."""
         return _at(self.slip, b)
+
+    def between(self, b: int) -> list:
+        """Return the equations of the velocities that masses couple, and of the directions, at boundary ``b``."""
+        return [*_at(self.balance, b), *_at(self.weights, b)]
 
     def _size(self, law, n):
         return (self.impulse[law.name, n].value or 0.0) if (law.name, n) in self.impulse else 0.0

@@ -1,12 +1,15 @@
 """Evaluate expressions that may be undefined, and read their signs and mutable Params."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from math import isfinite, nan
 
 from pyomo.common.errors import InfeasibleConstraintException, IntervalException
+from pyomo.common.numeric_types import native_numeric_types
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
 from pyomo.core import value
+from pyomo.core.base.var import VarData
+from pyomo.core.expr import ProductExpression
 from pyomo.core.expr.visitor import identify_mutable_parameters
 
 from pyomo_fesd.core.interruption import DeferredInterrupt
@@ -59,3 +62,23 @@ def known_sign(z) -> int:
     except (InfeasibleConstraintException, IntervalException, ArithmeticError, KeyError):
         return 0  # no interval arithmetic for a function in z, or none that fits its bounds
     return 1 if low >= 0 else -1 if high <= 0 else 0
+
+
+def variables_that_count(expression) -> Iterator[VarData]:
+    """Yield the variables of an expression, without terms with a factor that is fixed to 0, as a gain that is not used."""
+    waiting = [expression]
+    while waiting:
+        node = waiting.pop()
+        if node.__class__ in native_numeric_types:
+            continue
+        if node.is_variable_type():
+            yield node
+        elif node.is_expression_type() and not _vanishes(node):
+            waiting.extend(node.args)
+
+
+def _vanishes(node):
+    """Whether a product has a factor that is fixed to 0."""
+    return isinstance(node, ProductExpression) and any(
+        a == 0 if a.__class__ in native_numeric_types else a.is_fixed() and value_or_nan(a) == 0 for a in node.args
+    )

@@ -22,11 +22,15 @@ OPERATIONS = {
 def gradient(expression, variables) -> list[float]:
     """Return the derivatives of an expression with respect to ``variables`` at their present values, fixed or not.
 
+    They are NaN where they depend on a variable without a value.
+
     Raises
     ------
     NotImplementedError
         for an operation that neither of them differentiates
     """
+    if any(v.value is None for v in variables):
+        return _by_casadi(expression, variables)
     try:
         return differentiate(expression, wrt_list=variables, mode=Modes.reverse_numeric)
     except (DifferentiationException, ArithmeticError, ValueError):

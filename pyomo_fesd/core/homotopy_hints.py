@@ -213,6 +213,28 @@ class Follower:
     swapped: bool = False
 
 
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """Places that are filled in their order up to an amount: sum_k s_k extent_k = amount, 0 <= 1 - s_k perp s_{k+1} >= 0.
+
+    Every branch gets the sides that the extents of its start show: where other pairs move the places, another one is the last to be
+    filled, and the branch with the sides of before has no solution.
+
+    Attributes
+    ----------
+    pairs : list of ComplementarityData
+        between each place and the next
+    shares : list of VarData, s_k
+    extents : list of (coefficient, VarData)
+    amount : float
+    """
+
+    pairs: list
+    shares: list
+    extents: list
+    amount: float
+
+
 class HomotopyHints(AutoSlots.Mixin):
     """The hints on one block; ``mpec_hybrid`` without them solves the same problem, perhaps to a worse local solution.
 
@@ -227,6 +249,7 @@ class HomotopyHints(AutoSlots.Mixin):
     coincidences : list of Coincidence
     arrivals : list of Arrival
     followers : list of Follower
+    fillings : list of Filling
     alike : list of tuples of VarData
         variables that are the same quantity at different places, and have one size
     """
@@ -239,6 +262,7 @@ class HomotopyHints(AutoSlots.Mixin):
         'coincidences',
         'arrivals',
         'followers',
+        'fillings',
         'alike',
     )
 
@@ -251,6 +275,7 @@ class HomotopyHints(AutoSlots.Mixin):
         self.arrivals = []
         self.alike = []
         self.followers = []
+        self.fillings = []
 
 
 Block.register_private_data_initializer(HomotopyHints, scope=SCOPE)
@@ -302,4 +327,5 @@ def all_hints(model: Block) -> HomotopyHints:
         total.arrivals += hints.arrivals
         total.alike += hints.alike
         total.followers += hints.followers
+        total.fillings += hints.fillings
     return total

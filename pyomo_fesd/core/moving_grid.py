@@ -1,6 +1,6 @@
 """The record of a moving grid: elements whose lengths are variables, and what ``fesd.finite_elements`` put on them.
 
-Written by ``fesd.finite_elements``; read by simulation, refinement, diagnostics and results.
+Written by ``fesd.finite_elements`` (the instants by ``at``); read by simulation, refinement, diagnostics and results.
 """
 
 from collections.abc import Iterator
@@ -74,6 +74,8 @@ class MovingGrid(AutoSlots.Mixin):
         the pairs of step equilibration, by element
     state_jumps : StateJumps or None
     hysteresis : Hysteresis or None
+    instants : dict
+        physical time -> ``Instant``
     """
 
     __slots__ = (
@@ -97,13 +99,14 @@ class MovingGrid(AutoSlots.Mixin):
         'equilibration',
         'state_jumps',
         'hysteresis',
+        'instants',
     )
 
     def __init__(self, wrt: ContinuousSet, block: Block, grid: Grid):
         for name in self.__slots__:
             setattr(self, name, None)
         self.wrt, self.block, self.grid = wrt, block, grid
-        self.complementarities = []
+        self.complementarities, self.instants = [], {}
         self.sources, self.splits, self.split_sources = ComponentMap(), ComponentMap(), ComponentMap()
 
     def source(self, condition):
@@ -134,6 +137,16 @@ class MovingGrid(AutoSlots.Mixin):
     def duration(self, element: Element):
         """Return h_n as an expression, in time of the plant."""
         return element.length * self.speed(element)
+
+    def time_expression(self, label: float):
+        """Return the physical time of a label (eq. 9 and 10) as an expression of the element lengths."""
+        time = float(self.wrt.first())
+        for element in self.grid.elements:
+            if label <= element.left:
+                break
+            inside = label < element.right
+            time += self.duration(element) * (self.grid.tau[element.points.index(label)] if inside else 1.0)
+        return time
 
     def physical_time(self) -> dict[float, float]:
         """Return the physical time of every label (eq. 9 and 10), in order of time."""

@@ -20,6 +20,7 @@ from pyomo_fesd.dcs.reading import (
     modes_left,
     read_exclusions,
     read_logic,
+    refuse_lists_of_times,
     refuse_twice_defined,
 )
 from pyomo_fesd.dcs.source_maps import defined_variables
@@ -53,6 +54,7 @@ class DcsWriter(TimeWriter):
         model, times, defined = self.block.model(), TimeIndex(self.wrt), defined_variables(self.block)
         with_hysteresis = ComponentSet(_disjunctions(model, self.hysteresis))
         nesting = Nesting(model, times, with_hysteresis)
+        refuse_lists_of_times(_disjunctions(model, self.targets), times)
         found = nesting.outermost(_disjunctions(model, self.targets), self.targets)
         reader = SystemReader(TimeVariables(model, self.wrt, self.defines), times)
         with PauseGC(), ExitStack() as undo:

@@ -2,7 +2,8 @@
 
 ``review`` calls the others and logs their messages; each is a function ``(model, wrt, switching functions) -> messages``:
 ``uniqueness`` (both modes lead away from a boundary), ``missed_crossings`` (a switch between two collocation points),
-``collapsed_elements`` and ``uneven_elements``.  The room reads results and moving grids, and changes nothing on the model.
+``collapsed_elements``, ``uneven_elements`` and ``varied_inputs`` (values on labels).  The room reads results and moving
+grids, and changes nothing on the model.
 """
 
 from pyomo_fesd.diagnostics.missed_crossings import missed_crossings

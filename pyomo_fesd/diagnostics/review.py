@@ -9,6 +9,7 @@ from pyomo_fesd.diagnostics.collapsed_elements import collapsed_elements
 from pyomo_fesd.diagnostics.missed_crossings import missed_crossings
 from pyomo_fesd.diagnostics.uneven_elements import uneven_elements
 from pyomo_fesd.diagnostics.uniqueness import not_unique
+from pyomo_fesd.diagnostics.varied_inputs import varied_inputs
 from pyomo_fesd.results import switching_functions
 
 logger = logging.getLogger('pyomo_fesd')
@@ -19,12 +20,14 @@ CHECKS = {
     'missed crossings': missed_crossings,
     'collapsed elements': collapsed_elements,
     'uneven elements': uneven_elements,
+    'inputs': varied_inputs,
 }
 
 
 def diagnose(model: Block) -> list[str]:
-    """Log warnings about missed crossings, collapsed and uneven elements, and solutions that are not unique; return the messages.
+    """Log warnings about what the certificate does not cover; return the messages.
 
+    They concern missed crossings, collapsed and uneven elements, inputs that follow labels, and solutions that are not unique.
     Called by ``mpec_hybrid`` and ``simulate`` for the moving grids on the Block that they solve.
     """
     grids = [wrt for wrt, moving in moving_grids(model).items() if _lies_on(moving.block, model)]

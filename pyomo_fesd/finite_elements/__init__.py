@@ -9,8 +9,10 @@ The transformation reads the switched systems that other transformations recorde
 - ``time_complementarities``, ``mixed_complementarity``, ``continuity``, ``algebraic_graph``: conditions and their continuity
 - ``cross_complementarity``, ``state_jumps``, ``hysteresis``, ``right_limits``, ``mode_limits``, ``relations``: the laws of
   switching
+- ``contacts``, ``impulse_balance``, ``impact_laws``, ``friction_impulses``, ``curved_contacts``: rigid contacts
 - ``equilibration``, ``sliding_exit``, ``neighbour_branches``, ``coincidences``, ``arrivals``: the lengths, and hints for the
   homotopy
+- ``recollocation``, ``inner_points``: more points in the elements of a model that is discretised already
 - ``given_inputs``, ``explicit_time``, ``untaken_kinks``, ``spatial_sets``, ``first_mode``: inputs, warnings and refusals
 """
 
@@ -18,4 +20,5 @@ from pyomo_fesd.finite_elements.equilibration import TINY
 from pyomo_fesd.finite_elements.first_mode import refuse_first_mode, refuse_first_modes
 from pyomo_fesd.finite_elements.hysteresis import LEFT, RIGHT
 from pyomo_fesd.finite_elements.lengths import LEAST
+from pyomo_fesd.finite_elements.recollocation import recollocate
 from pyomo_fesd.finite_elements.transformation import FiniteElements

@@ -48,6 +48,23 @@ class Collocation(Collocation_Discretization_Transformation):
         super()._transformBlock(block, currentds)
         wrt.get_discretization_info().update(nfe=len(elements) - 1, tau_points=tau)
 
+    def place(self, wrt: ContinuousSet, boundaries: list[float], ncp: int) -> None:
+        """Place Radau points between ``boundaries``, and describe the scheme in ``wrt`` as pyomo.dae does."""
+        key = wrt.name
+        self._ncp[key] = ncp
+        self._get_radau_constants(key)
+        self._place_points(wrt, boundaries, self._tau[key])
+        wrt._fe = boundaries
+        wrt.get_discretization_info().update(
+            nfe=len(boundaries) - 1,
+            ncp=ncp,
+            tau_points=self._tau[key],
+            adot=self._adot[key],
+            adotdot=self._adotdot[key],
+            afinal=None,
+            scheme='LAGRANGE-RADAU',
+        )
+
     def _place_points(self, wrt, elements, tau):
         inner = [c for c in tau if 0 < c < 1]
         for left, right in zip(elements, elements[1:]):

@@ -81,7 +81,7 @@ def discretise(block: Block, wrt: ContinuousSet, shares: list[int], ncp: int, sc
         try:
             with hybrid_expansion(block, wrt):
                 Collocation(decimals).apply_to(block, wrt=wrt, nfe=sum(shares), ncp=ncp, scheme=scheme)
-            _call_rules_again(block, wrt)
+            call_rules_again(block, wrt)
         except (KeyError, ValueError) as error:
             complete_params(block, wrt, controls, error)
             raise FesdError(
@@ -93,7 +93,7 @@ def discretise(block: Block, wrt: ContinuousSet, shares: list[int], ncp: int, sc
         fix_at_new_times(inputs, wrt)
 
 
-def _call_rules_again(block, wrt):
+def call_rules_again(block, wrt):
     """Call rules of Constraints again that left out an index: Pyomo treats a KeyError in a rule as Skip, and loses the equation."""
     for component in block.component_objects(Constraint, descend_into=PLACES):
         if not is_indexed_by(component, wrt) or component.rule is None or len(component) == len(component.index_set()):

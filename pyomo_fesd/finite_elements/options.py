@@ -22,8 +22,8 @@ def _gamma(arg):
     return _checked(float, arg, lambda gamma: 0 <= gamma < 1, "it is not a number in [0, 1)")
 
 
-def _points(arg):
-    """A number of collocation points."""
+def points(arg) -> int:
+    """Return a number of collocation points; a ValueError says why ``arg`` is none."""
     return _checked(PositiveInt, arg, lambda number: number <= MOST_POINTS, f"it is not an integer from 1 to {MOST_POINTS}")
 
 
@@ -74,7 +74,7 @@ OPTIONS = {
         _numbers,
         "number of finite elements, all control stages together; or a list with one number for each control stage",
     ),
-    'ncp': (3, _points, f"collocation points in each element (K), at most {MOST_POINTS}"),
+    'ncp': (3, points, f"collocation points in each element (K), at most {MOST_POINTS}"),
     'scheme': (
         'LAGRANGE-RADAU',
         In(['LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE']),

@@ -40,11 +40,17 @@ class Integrand:
 
 def integrands(block: Block, wrt: ContinuousSet) -> Iterator[Integrand]:
     """Yield the integrands of every Integral over ``wrt``, also after pyomo.dae made it an Expression."""
+    for integral in integrals(block, wrt):
+        rule, rewrite = _integrand_rule(integral), integrand_rewriter(integral, wrt)
+        for index in integral.index_set() if integral.is_indexed() else [None]:
+            yield Integrand(integral, index, cache(_at(integral, index_tuple(index), rule, rewrite)))
+
+
+def integrals(block: Block, wrt: ContinuousSet) -> Iterator[Integral]:
+    """Yield every Integral over ``wrt``, also after pyomo.dae made it an Expression."""
     for integral in block.component_objects((Integral, Expression), descend_into=Block):
         if isinstance(integral, Integral) and integral.get_continuousset() is wrt:
-            rule, rewrite = _integrand_rule(integral), integrand_rewriter(integral, wrt)
-            for index in integral.index_set() if integral.is_indexed() else [None]:
-                yield Integrand(integral, index, cache(_at(integral, index_tuple(index), rule, rewrite)))
+            yield integral
 
 
 def _at(integral, index, rule, rewrite):

@@ -32,7 +32,9 @@ from pyomo_fesd.core import (
     is_discretisation_equation,
     strip_time,
 )
-from pyomo_fesd.finite_elements.contacts import ContactLaw, declare_impacts, stabilise, write_impacts
+from pyomo_fesd.finite_elements.contacts import ContactLaw, declare_impacts
+from pyomo_fesd.finite_elements.curved_contacts import stabilise
+from pyomo_fesd.finite_elements.impact_laws import write_impacts
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from pyomo_fesd.core import (
 )
 from pyomo_fesd.finite_elements.arrivals import add_arrivals
 from pyomo_fesd.finite_elements.coincidences import add_coincidences
-from pyomo_fesd.finite_elements.contacts import add_friction_impulses, read_contacts, with_departures
+from pyomo_fesd.finite_elements.contacts import read_contacts, with_departures
 from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
 from pyomo_fesd.finite_elements.controls import check_controls, fix_given, hold_controls
 from pyomo_fesd.finite_elements.cross_complementarity import add_cross_complementarity
@@ -40,6 +40,7 @@ from pyomo_fesd.finite_elements.equilibration import add_equilibration
 from pyomo_fesd.finite_elements.expansion import discretise
 from pyomo_fesd.finite_elements.explicit_time import expressions_over_time, warn_explicit_time
 from pyomo_fesd.finite_elements.free_time import check_free_time, factors
+from pyomo_fesd.finite_elements.friction_impulses import add_friction_impulses
 from pyomo_fesd.finite_elements.given_inputs import complete_params
 from pyomo_fesd.finite_elements.hysteresis import add_hysteresis, read_hysteresis
 from pyomo_fesd.finite_elements.lengths import add_lengths, check_orders, multiply_derivatives
@@ -48,6 +49,7 @@ from pyomo_fesd.finite_elements.mode_limits import with_mode_limits
 from pyomo_fesd.finite_elements.neighbour_branches import add_neighbour_branches
 from pyomo_fesd.finite_elements.options import RENAMED, declare_options
 from pyomo_fesd.finite_elements.quadrature import integrands, rebuild
+from pyomo_fesd.finite_elements.recollocation import warn_of_order_one
 from pyomo_fesd.finite_elements.right_limits import RightLimits
 from pyomo_fesd.finite_elements.sliding_exit import add_sliding_exits
 from pyomo_fesd.finite_elements.spatial_sets import refuse_waiting_space
@@ -118,9 +120,12 @@ class FiniteElements(Transformation):
         instance = _common_block(instance, wrt)
         _check_keywords(instance, wrt, config)
         with TRANSFORMATION, restored_on_error(instance, wrt), PauseGC():
+            present = discretised(wrt)
             moving = _add_grid(instance, wrt, config)
             integrals = _rebuild_integrals(instance, moving)
             switching = _read_switching(instance, wrt, config)
+            if present and switching:
+                warn_of_order_one(moving)
             _warn(expressions_over_time(instance, moving, integrals, switching.laws()), moving)
             continuity = _read_continuity(instance, moving, switching, config)
             complementarities = _read_complementarities(moving, switching, continuity)

@@ -6,7 +6,15 @@ from pyomo.core.base.block import BlockData
 from pyomo.core.base.var import VarData
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import GENERATED, FesdError, add_positive_part, continuous_sets, declare_positive_part, refuse_foreign
+from pyomo_fesd.core import (
+    GENERATED,
+    FesdError,
+    add_positive_part,
+    continuous_sets,
+    declare_positive_part,
+    discretised,
+    refuse_foreign,
+)
 
 
 class _Count(AutoSlots.Mixin):
@@ -39,7 +47,10 @@ def check_block(block, z) -> None:
     refuse_foreign(variables, block.model(), block)
     known = continuous_sets(block)
     for v in variables:
-        for wrt in continuous_sets(v) - known:
+        own = continuous_sets(v)
+        # beside the time of the block, one place of a space that has all its points
+        missing = [s for s in own if s not in known and (own.isdisjoint(known) or not discretised(s))]
+        for wrt in missing[:1]:
             raise FesdError(
                 block,
                 f"'{v.name}' is a function of '{wrt.name}' and this block is not, so max(0, z) could not be followed over "

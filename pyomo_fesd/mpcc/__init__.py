@@ -24,4 +24,14 @@ from pyomo_fesd.mpcc.compile import (
 from pyomo_fesd.mpcc.multistart import Multistart
 from pyomo_fesd.mpcc.nlp import Deadline, OutOfTime, PlainIpopt
 from pyomo_fesd.mpcc.reporting import Loader, LogTable, RunRecord, StartsTable, fill_results, log_streams, reporter
-from pyomo_fesd.mpcc.subproblems import RELAXATIONS, Certificate, Lpec, SolverCache, certify_point, sort_sides
+from pyomo_fesd.mpcc.subproblems import (
+    RELAXATIONS,
+    Certificate,
+    Lpec,
+    SolverCache,
+    active_sets,
+    certify_point,
+    settle,
+    sort_sides,
+    without_constant,
+)

@@ -5,6 +5,7 @@ A mode of a pair is named by the side that is positive, of a condition with two 
 
 from collections.abc import Iterable
 
+import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block
 from pyomo.dae import ContinuousSet
@@ -24,6 +25,8 @@ from pyomo_fesd.core import (
 
 #: A multiplier nearer than this to 0 (or to 1) counts as off (or on).
 CLEAR = 1e-6
+#: In elements without a clear mode, values above this part of the largest one of their mode count, unless all are below the second.
+PART, NOISE = 1e-3, 1e-8
 #: The modes of a condition with two bounds on one side.
 AT_LOWER, BETWEEN, AT_UPPER = 'at lower bound', 'between', 'at upper bound'
 #: The modes of a rigid contact.
@@ -99,4 +102,14 @@ def _shares(modes, together):
 
 def positive_modes(modes: dict, labels: Iterable[float]) -> list[str]:
     """Return the modes with a positive expression at one of ``labels``."""
-    return [mode for mode, weights in modes.items() if any(t in weights and value_or_nan(weights[t]) > CLEAR for t in labels)]
+    return _above(modes, labels, dict.fromkeys(modes, CLEAR))
+
+
+def relatively_positive_modes(modes: dict, labels: Iterable[float]) -> list[str]:
+    """Return the modes with an expression that is positive at one of ``labels`` beside its largest value: for small units."""
+    largest = {mode: float(np.nanmax([0.0, *map(value_or_nan, weights.values())])) for mode, weights in modes.items()}
+    return _above(modes, labels, {mode: max(PART * size, NOISE) for mode, size in largest.items()})
+
+
+def _above(modes, labels, least):
+    return [mode for mode, weights in modes.items() if any(t in weights and value_or_nan(weights[t]) > least[mode] for t in labels)]

@@ -7,7 +7,7 @@ from pyomo.core import Block, value
 from pyomo.dae import ContinuousSet
 
 from pyomo_fesd.core import Element, TimeIndex, find_continuous_set, strip_time
-from pyomo_fesd.results.complementarity_modes import complementarity_modes, positive_modes
+from pyomo_fesd.results.complementarity_modes import complementarity_modes, positive_modes, relatively_positive_modes
 from pyomo_fesd.results.disjunction_modes import disjunction_modes, surface_sides
 from pyomo_fesd.results.physical_time import elements, physical_time
 from pyomo_fesd.results.trajectory import jumps_that_happen
@@ -45,14 +45,19 @@ def switches(model: Block, wrt: ContinuousSet | None = None) -> Switches:
         list of ``Switch(time, disjunction, before, after)``
     """
     wrt = find_continuous_set(model, wrt, 'switches')
+    return Switches(switch for _, switch in labelled_switches(model, wrt))
+
+
+def labelled_switches(model: Block, wrt: ContinuousSet) -> list[tuple[float, Switch]]:
+    """Return ``(label, Switch)`` in order of time; the label is that of the element boundary at which it happens."""
     found, index = elements(wrt), TimeIndex(wrt)
     times = physical_time(model, wrt)
     systems = disjunction_modes(model, index) | complementarity_modes(model, wrt, index) | surface_sides(model, index)
-    changes = [Switch(times[t], name, *both) for name, modes in systems.items() for t, *both in _changes(modes, found)]
+    changes = [(t, Switch(times[t], name, *both)) for name, modes in systems.items() for t, *both in _changes(modes, found)]
     for _, label, name, after in jumps_that_happen(model, wrt):
         before = [(x, value(x)) for x, _ in after]
-        changes.append(Switch(times[label], name, _state_values(before, index), _state_values(after, index)))
-    return Switches(sorted(changes, key=lambda s: s.time))
+        changes.append((label, Switch(times[label], name, _state_values(before, index), _state_values(after, index))))
+    return sorted(changes, key=lambda change: change[1].time)
 
 
 def _changes(modes, found: tuple[Element, ...]) -> Iterator[tuple]:
@@ -69,6 +74,7 @@ def _changes(modes, found: tuple[Element, ...]) -> Iterator[tuple]:
 def _active_mode(modes, element):
     """The mode with a positive multiplier inside an element; several slide; None where no multiplier is clear."""
     on = positive_modes(modes, element.points) or positive_modes(modes, (element.left,))
+    on = on or relatively_positive_modes(modes, element.points)
     if not on:
         return None
     return on[0] if len(on) == 1 else 'sliding ' + ' | '.join(on)

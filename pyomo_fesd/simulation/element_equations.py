@@ -74,6 +74,7 @@ class ElementEquations:
         equal for equations that differ in the values of ``known`` only
     times : TimeIndex
     factor : callable VarData -> the user's ``scaling_factor`` or None
+    size_factor : callable VarData -> factor by its size, or None, where there is no such factor of the user
     """
 
     rows: list[RelationalExpression]
@@ -90,6 +91,7 @@ class ElementEquations:
     element_class: int
     times: TimeIndex
     factor: Callable[[VarData], float | None]
+    size_factor: Callable[[VarData], float | None] = lambda v: None
 
     @property
     def all_rows(self) -> list[RelationalExpression]:

@@ -34,9 +34,11 @@ class ElementModel:
             self._copies[id(v)].bounds = bounds
             self._copies[id(v)].set_value(v.value, skip_validation=True)
         factors = pattern.factors
-        for v, factor in factors.items():
-            m.scaling_factor[self._copies[id(v)]] = factor
         self.length = None if pattern.length is None else self._copies[id(pattern.length)]
+        for v in pattern.unknown:
+            factor = factors.get(v, None if v is pattern.length else pattern.size_factor(v))
+            if factor is not None:
+                m.scaling_factor[self._copies[id(v)]] = factor
         m.row = pyo.ConstraintList()
         for row in pattern.rows:
             self._add(row, pattern, factors)

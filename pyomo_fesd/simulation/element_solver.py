@@ -8,15 +8,18 @@ from pyomo_fesd.simulation.element_class import ElementClass, ElementEnd
 from pyomo_fesd.simulation.equation_reader import EquationReader
 from pyomo_fesd.simulation.events import JumpEvents, read_hysteresis
 from pyomo_fesd.simulation.impacts import ImpactEvents
-from pyomo_fesd.simulation.inputs import given_variables
+from pyomo_fesd.simulation.inputs import given_variables, prescribed_states
 from pyomo_fesd.simulation.largest_residuals import largest_residuals
 from pyomo_fesd.simulation.progress import Progress
+from pyomo_fesd.simulation.sizes import Sizes
 from pyomo_fesd.simulation.step_sizes import SimulatedElement
 
 #: Parts of an element's length, or of the length aimed at if that is longer.  A step shorter than the first is none: the rest of a
 #: control stage after a switch may be as short as the solver's tolerances.  A step that misses its aim by more than the second has
 #: been cut short by an event.
 NO_STEP, CUT = 1e-9, 1e-7
+#: A given state jumps if it changes by more than the first part of its value, and so many times faster than to the element's end.
+JUMP, STEEP = 1e-6, 2.0
 #: Options of the MPCC, tried in this order: a warm start from the last element; searches farther away; other starts.  A step of
 #: length zero is a local solution of its own where a switch lies on the left boundary, so the later ones search farther.
 TRIES = (
@@ -36,9 +39,9 @@ class ElementSolver:
         self._moving = moving_grids(model)[wrt]
         self._grid, self._hysteresis = self._moving.grid, read_hysteresis(self._moving)
         self._jumps = JumpEvents(self._moving.state_jumps)
-        if self._moving.state_jumps is not None and self._moving.state_jumps.impacts is not None:
-            # gaps and forces of contacts are 0 to round-off over long times, which is no size
-            self._options = {'natural_units': 'user'} | self._options
+        has_contacts = self._moving.state_jumps is not None and self._moving.state_jumps.impacts is not None
+        # gaps and forces of contacts are 0 to round-off over long times, which is no size
+        self._sizes = Sizes(self._times) if has_contacts else None
         self._impacts = ImpactEvents(self._moving.state_jumps, self._times, self._solve_impact)
         given = given_variables(model, self._times, inputs, self._moving.held)
         given.update(v for some in self._hysteresis for e in self._grid.elements for v in some.variables(e.right))
@@ -50,11 +53,12 @@ class ElementSolver:
         for modes in self._hysteresis:
             modes.begin(self._first)
             modes.set_weights(self._grid.elements[0])
+        self._learn_sizes()
         equations = self._reader.first(self._first)
         states = (v for d in derivatives(self._model, self._times.wrt) for v in d.get_state_var().values())
         refuse_undetermined_start(equations, [v for v in states if self._times.time(v) == self._first and not v.fixed])
         if equations.unknown:
-            initial = ElementClass(equations, None, (1.0,), self._options, self._timer, self._progress.deadline)
+            initial = ElementClass(self._sized(equations), None, (1.0,), self._options, self._timer, self._progress.deadline)
             if not initial.find_initial_values(equations) or self._reader.active_set(self._first) is None:
                 self._solve_first_mpcc(initial.mpcc, equations)
 
@@ -133,7 +137,7 @@ class ElementSolver:
         element_class, longest = self._class_of(equations, element), max(most, element.length)
         found = element_class.newton_step(equations, self._end, most, lambda: self._values_before(equations, element))
         if found is None:
-            found = self._mpcc_step(element_class, equations, most, TRIES[not warm :], NO_STEP * longest)
+            found = self._mpcc_step(element_class, equations, most, TRIES[not warm :], NO_STEP * longest, element)
         h, end = found
         h = most if h > most - CUT * longest else h
         self._moving.r[element.n].set_value(h / element.length, skip_validation=True)
@@ -156,8 +160,22 @@ class ElementSolver:
     def _class(self, equations, nominal, tau):
         key = equations.element_class
         if key not in self._classes:
+            equations = self._sized(equations)
             self._classes[key] = ElementClass(equations, nominal, tau, self._options, self._timer, self._progress.deadline)
         return self._classes[key]
+
+    def _learn_sizes(self):
+        if self._sizes is not None:
+            element = self._grid.elements[0]
+            equations = self._read(element)
+            self._sizes.learn(equations, self._values_before(equations, element))
+
+    def _sized(self, equations):
+        """The equations with factors by the sizes of their variables; without contacts as they are."""
+        if self._sizes is None:
+            return equations
+        self._sizes.learn(equations, [v.value for v in equations.unknown])
+        return replace(equations, size_factor=self._sizes.factor)
 
     def _values_before(self, equations, element):
         """Values that the unknowns of an element have at its left boundary."""
@@ -171,20 +189,27 @@ class ElementSolver:
             found = None
         return v.value if found is None else found
 
-    def _mpcc_step(self, element_class, equations, most, tries, least):
+    def _mpcc_step(self, element_class, equations, most, tries, least, element):
         """A step longer than ``least`` where the next active set is unknown, or does not hold."""
         for options in tries:
             answer, h = element_class.mpcc_step(equations, most, options)
             self._progress.check_time()
             if answer.stationarity == 'B' and h > least:
                 return element_class.accept_mpcc(equations, most, h)
-        raise self._no_step(element_class, equations, most, answer)
+        raise self._no_step(element_class, equations, most, answer, element)
 
-    def _no_step(self, element_class, equations, most, answer):
+    def _no_step(self, element_class, equations, most, answer, element):
         mpcc, now = element_class.mpcc, f"{self._progress.time:.6g}"
         mpcc.solve_with_length(equations, most / element_class.nominal)
         residuals = largest_residuals(self._model, self._times, equations, mpcc.values)
         forced = f"; where one is forced, {residuals}" if residuals else ''
+        jump = self._jump_of_given_state(element)
+        if jump:
+            return self._progress.error(
+                f"no step was found from time {now}: {jump}{forced}",
+                "a state cannot jump: let its values be continuous, also from the first time on, as those of "
+                "pyomo_fesd.signal(..., kind='linear')",
+            )
         if answer.stationarity == 'B':
             return self._progress.error(
                 f"no step is possible from time {now}{forced}",
@@ -194,3 +219,16 @@ class ElementSolver:
             f"no step was found from time {now}: {answer.outcome}{forced}",
             "check the equations there; more elements help where the solution is steep",
         )
+
+    def _jump_of_given_state(self, element):
+        """A sentence on a state that is given and has another value right of the boundary than on it; empty without one."""
+        for by_time in prescribed_states(self._model, self._times):
+            left, right = by_time.get(element.left), by_time.get(element.points[0])
+            far = by_time.get(element.right)
+            if None in (left, right, far) or None in (left.value, right.value, far.value):
+                continue
+            # a given ramp changes in proportion to time, a jump at once
+            change, least = abs(right.value - left.value), JUMP * max(abs(left.value), abs(right.value))
+            if change > max(least, STEEP * self._grid.tau[0] * abs(far.value - left.value)):
+                return f"the state '{right.name}' is given, and jumps there from {left.value:.6g} to {right.value:.6g}"
+        return ''

@@ -12,6 +12,7 @@ from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Constraint, value
 from pyomo.core.base.suffix import Suffix, SuffixFinder
 from pyomo.core.base.var import VarData
+from pyomo.core.expr import RangedExpression
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core import MovingGrid, TimeIndex, derivatives, is_discretisation_equation, is_generated, read_complementarity
@@ -131,7 +132,7 @@ class EquationReader:
             tuple(event_functions),
         )
         return ElementEquations(
-            rows=[c.expr for c in constraints],
+            rows=list(map(_relation, constraints)),
             event_functions=event_functions,
             cross_pairs=pairs,
             point_pairs=points,
@@ -179,6 +180,12 @@ def _scaling_factors(model):
     """The function that returns the user's scaling factor of a variable, or None."""
     present = any(s.local_name == 'scaling_factor' for s in model.component_objects(Suffix, active=True))
     return SuffixFinder('scaling_factor', None, model).find if present else lambda v: None
+
+
+def _relation(constraint):
+    """The relation that a constraint states; an equation also where two equal bounds state it."""
+    expr = constraint.expr
+    return constraint.body == constraint.upper if isinstance(expr, RangedExpression) and constraint.equality else expr
 
 
 def _data(component):

@@ -70,7 +70,7 @@ class ImpactEvents:
             self._solve(b, closed)
             for law in self._laws:
                 if law.name not in closed:
-                    self._set_parts(law.name, b)
+                    self._impacts.set_parts(law.name, b)
         return approaching
 
     def _is_closed(self, law, label):
@@ -97,16 +97,4 @@ class ImpactEvents:
             if after.is_variable_type():
                 after.set_value(v.value, skip_validation=True)
         for law in self._laws:
-            self._set_parts(law.name, b)
-
-    def _set_parts(self, name, b):
-        """The least N, and P and Q with it."""
-        impacts, index = self._impacts, (name, b)
-        variables = [some[index] for some in (impacts.above, impacts.below, impacts.leaving) if index in some]
-        for v in variables:
-            v.set_value(0.0)
-        # at the first time the second row is no equation of these parts
-        rates = [value(impacts.parts[(*index, k)].body) for k in range(1, len(variables))]
-        N = max(0.0, *(-rate for rate in rates))
-        for v, number in zip(variables, (rates[0] + N, N, rates[-1] + N)):
-            v.set_value(number)
+            self._impacts.set_parts(law.name, b)

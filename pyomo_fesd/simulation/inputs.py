@@ -35,17 +35,17 @@ def read_inputs(inputs: Var | Iterable[Var], wrt: ContinuousSet) -> list[Var]:
 def given_variables(model: Block, times: TimeIndex, inputs: Iterable[Var], held: Constraint) -> ComponentSet:
     """Return the data of ``inputs``, of prescribed states, and of the controls in the equations ``held``."""
     given = ComponentSet(v for u in inputs for v in u.values())
-    given.update(_prescribed_states(model, times))
+    given.update(v for by_time in prescribed_states(model, times) for v in by_time.values())
     given.update(v for row in held.values() for v in _hold_last_value(row, times))
     return given
 
 
-def _prescribed_states(model, times) -> Iterator[VarData]:
-    """States fixed at every time are inputs, such as a flow at the end of a pipe that is a state inside it."""
+def prescribed_states(model: Block, times: TimeIndex) -> Iterator[dict[float, VarData]]:
+    """Yield states fixed at every time, which are inputs, such as a flow at the end of a pipe that is a state inside it."""
     for derivative in derivatives(model, times.wrt):
         for over_time in times.families(derivative.get_state_var().values()).values():
             if len(over_time) > 2 and all(v.fixed for v in over_time.values()):
-                yield from over_time.values()
+                yield over_time
 
 
 def _hold_last_value(row, times):

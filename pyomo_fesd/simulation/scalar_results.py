@@ -3,7 +3,8 @@
     J == integral of x**2,    worst == J + x[T]
 
 Takes: a simulated model.
-Leaves: values of the variables without time that one equation after the other determines.
+Leaves: values of the variables without time that one equation after the other determines; shares of elements before the times
+    of ``at``.
 Does not apply: to variables that equations over time contain, which are given; to variables that only several equations together
     determine.
 """
@@ -17,7 +18,7 @@ from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity
 from pyomo.util.calc_var_value import calculate_variable_from_constraint
 
-from pyomo_fesd.core import TimeIndex, is_generated, read_complementarity
+from pyomo_fesd.core import TimeIndex, is_generated, moving_grids, read_complementarity
 from pyomo_fesd.simulation.structural_key import variables_of
 
 logger = logging.getLogger('pyomo_fesd')
@@ -25,6 +26,8 @@ logger = logging.getLogger('pyomo_fesd')
 
 def evaluate_scalars(model: Block, wrt: ContinuousSet) -> None:
     """Set the variables without time that are defined by the solution."""
+    for instant in moving_grids(model)[wrt].instants.values():
+        instant.place()
     times = TimeIndex(wrt)
     waiting = _without(ComponentSet(), {c: _open(c, times) for c in _scalar_equations(model, times)})
     if waiting:

@@ -4,7 +4,8 @@
 
 Takes: a model or a block of one, also the temporary blocks of Pyomo and IDAES; options in Ipopt's own names.
 Leaves: values, multipliers in import suffixes; nothing else on the model.
-Does not apply: to complementarities, modes and integers, which it refuses; to external functions and if-then-else.
+Does not apply: to complementarities, modes and integers, which it refuses; to external functions.
+If-then-else is casadi's: a kink, at which Ipopt may stall.
 """
 
 import io
@@ -24,6 +25,8 @@ from pyomo_fesd.core import REDIRECTION, FesdError, interruptible, phase
 from pyomo_fesd.mpcc import Contradiction, Loader, OutOfTime, PlainIpopt, compile_mpcc, plain_nlp, read_mpcc
 from pyomo_fesd.results import set_indicators
 from pyomo_fesd.solvers.plugin import CasadiSolver, LegacyPlugin, deadline, with_structure
+from pyomo_fesd.solvers.singular_start import with_perturbation
+from pyomo_fesd.solvers.stand_in import ExecutableKeywords, LegacyExecutableKeywords, Replacement
 from pyomo_fesd.solvers.unready_models import refuse_unready
 from pyomo_fesd.solvers.user_names import user_names
 
@@ -112,14 +115,18 @@ class CasadiIpopt(CasadiSolver):
             with phase(config.timer, 'compile'), PauseGC():
                 until = deadline(config, started)
                 problem = _read_nlp(model)
-                compiled = compile_mpcc(problem, config.timer, config.working_dir, user_scaling=scaled, check=until.check)
+                compiled = compile_mpcc(
+                    problem, config.timer, config.working_dir, user_scaling=scaled, check=until.check, conditions=True
+                )
         except (Contradiction, OutOfTime) as error:
             late = isinstance(error, OutOfTime)
             _conclude(results, *(TOO_LATE if late else ('Fixed values contradict', str(error))))
             results.solution_loader = Loader(model, None, None, None)
         else:
             with phase(config.timer, 'ipopt'):
-                answer, results.solver_log = _run(compiled, options, config.tee, until)
+                answer, results.solver_log = with_perturbation(
+                    lambda more: _run(compiled, options | more, config.tee, until), compiled, options
+                )
             _conclude(results, answer.status, answer.status.replace('_', ' '), answer.iterations)
             results.solution_loader = Loader(model, compiled, answer.w, answer, set_indicators)
             if results.solution_status is not SolutionStatus.optimal:
@@ -204,3 +211,30 @@ class LegacyCasadiIpopt(LegacyPlugin, CasadiIpopt):
         legacy, solution = super()._map_results(model, results)
         legacy.solver.message = results.extra_info.solver_message
         return legacy, solution
+
+
+class StandInIpopt(ExecutableKeywords, CasadiIpopt):
+    """``casadi_ipopt`` with the keywords of a solver that runs an executable."""
+
+
+class LegacyStandInIpopt(LegacyExecutableKeywords, LegacyCasadiIpopt):
+    """The same in Pyomo's older interface."""
+
+
+def stand_in() -> Replacement:
+    """Let the names ``ipopt`` and ``ipopt_v2`` mean the Ipopt in casadi's wheel, from now on or within a ``with`` block.
+
+    Scripts and initialisers that name them, through ``SolverFactory`` of both interfaces, IDAES' ``get_solver`` or
+    ``InitializerBase`` objects and their sub-models, then need no executable.  Importing the package never does this.
+
+    Returns
+    -------
+    Replacement
+        a context manager, which undoes the replacement when it is left; a call of its own lasts until ``undo()``
+
+    Examples
+    --------
+    >>> with pyomo_fesd.casadi_ipopt.stand_in():
+    ...     m.fs.unit.initialize()
+    """
+    return Replacement(LegacyStandInIpopt, StandInIpopt)

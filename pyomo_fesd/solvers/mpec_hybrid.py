@@ -234,20 +234,32 @@ def certify(model: Block, **options) -> Certificate:
     Certificate
         with ``certified``, ``grade`` (a sentence), the residuals, ``value`` of the LPEC and its ``direction`` by variable
     """
-    check_keywords(MpecHybrid.CONFIG, options, 'certify')
+    ready, certificate = certified_model(model, options, 'certify')
+    if certificate.lpec is None:
+        return certificate
+    return replace(certificate, direction=ComponentMap(zip(ready.compiled.variables, map(float, certificate.lpec.d))))
+
+
+def certified_model(model: Block, options: dict, caller: str, parameters=()) -> tuple[PersistentModel, Certificate]:
+    """Compile ``model`` and judge its present values; returns the ``PersistentModel``, prepared, and the ``Certificate``.
+
+    Raises
+    ------
+    FesdError
+        as ``certify``, and for a component of ``parameters`` that is not a parameter
+    """
+    check_keywords(MpecHybrid.CONFIG, options, caller)
     config = MpecHybrid.CONFIG(value=options)
     timer = HierarchicalTimer()
-    ready = PersistentModel(model, config, timer)
+    ready = PersistentModel(model, config, timer, parameters)
     ready.cache.prepare(config)
     compiled = ready.compiled
     if compiled.missing:
         first = next(v for v in compiled.variables if start_value(v.value) is None)
         others = f" (nor have {compiled.missing - 1} others)" * (compiled.missing > 1)
         raise FesdError(first, f"has no value that could be judged{others}", "solve the model first, or set its values")
-    certificate = HybridSolver(Setup(compiled, config, timer, ready.deadline, ready.cache, _ignore, _ignore)).certify()
-    if certificate.lpec is None:
-        return certificate
-    return replace(certificate, direction=ComponentMap(zip(compiled.variables, map(float, certificate.lpec.d))))
+    setup = Setup(compiled, config, timer, ready.deadline, ready.cache, _ignore, _ignore)
+    return ready, HybridSolver(setup).certify()
 
 
 def _ignore(_):

@@ -73,8 +73,9 @@ OPTIONS = (
         'auto',
         In(['auto', True, False]),
         "simulate first (pyomo_fesd.simulate) and start from these values: 'auto' where there is no objective and no state is "
-        "fixed later, elsewhere if the homotopy finds no feasible point; with True controls keep their values, and the run goes "
-        "on as with warm_start; a simulation that fails is noted in the log, and the run begins with the model's values",
+        "fixed later, elsewhere if the homotopy finds no feasible point, and after each relaxation, with its controls, where "
+        "states jump; with True controls keep their values, and the run goes on as with warm_start; a simulation that fails is "
+        "noted in the log, and the run begins with the model's values",
     ),
     (
         'nlp_solver',

@@ -37,7 +37,7 @@ class PersistentModel:
     """
 
     def __init__(self, model, options, timer, parameters=(), deadline=None):
-        self.model, datas = model, parameter_data(parameters)
+        self.model, self.options, datas = model, options, parameter_data(parameters)
         self.deadline = deadline or Deadline()
         refuse_unready(model, 'mpec_hybrid')
         problem = read_mpcc(model)

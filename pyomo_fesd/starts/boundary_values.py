@@ -2,7 +2,7 @@
 
 Takes: a moving grid whose states and weights have their values.
 Leaves: values of ``e`` of the state jumps, and of ``n`` and ``m`` of the modes with hysteresis.
-Does not apply: to impulses of contacts, which keep their values.
+Does not apply: to impulses of contacts (``impulses``).
 """
 
 import numpy as np
@@ -17,17 +17,23 @@ NEAR = 1e-6
 
 def set_jumps(moving: MovingGrid, times: TimeIndex, table: TimeTable) -> None:
     """Let a law act at a boundary where the table jumps, if the values after it are nearer to those of the table."""
-    jumps, physical, at = moving.state_jumps, moving.physical_time(), table.jump_times()
+    jumps, physical = moving.state_jumps, moving.physical_time()
     if jumps is None:
         return
-    near = NEAR * (max(physical.values()) - min(physical.values()))
     for element in moving.grid.elements[:-1]:
-        here = at[np.abs(at - physical[element.right]) <= near]
+        here = jump_near(moving, table, physical[element.right])
         for law in jumps.laws:
             e = jumps.e[law.name, element.n]
             if not e.fixed:
                 resets = law.resets.get(element.right, ())
-                e.set_value(float(here.size > 0 and _explains(resets, here[0], times, table)))
+                e.set_value(float(here is not None and _explains(resets, here, times, table)))
+
+
+def jump_near(moving: MovingGrid, table: TimeTable, time: float) -> float | None:
+    """Return the time at which the table jumps near a boundary; None if it does not."""
+    at, physical = table.jump_times(), moving.physical_time()
+    here = at[np.abs(at - time) <= NEAR * (max(physical.values()) - min(physical.values()))]
+    return float(here[0]) if here.size else None
 
 
 def _explains(resets, time, times, table):

@@ -32,6 +32,7 @@ from pyomo_fesd.starts.boundary_values import set_hysteresis, set_jumps
 from pyomo_fesd.starts.consistent_values import make_consistent
 from pyomo_fesd.starts.element_placement import check_horizon, free_durations, place_elements, set_within_bounds
 from pyomo_fesd.starts.held_controls import held_intervals
+from pyomo_fesd.starts.impulses import set_impulses, set_parts
 from pyomo_fesd.starts.time_table import ELEMENT, LABEL, TimeTable
 
 
@@ -119,6 +120,7 @@ def _set_values(model, moving, table, columns):
         if not v.fixed and v not in held:
             set_within_bounds(v, series.at(physical[times.time(v)]))
     set_jumps(moving, times, table)
+    set_impulses(moving, times, table)
     states = (v for d in derivatives(model, moving.wrt) for v in d.get_state_var().values())
     known = ComponentSet([*states, *held, *given])
     variables = model.component_data_objects(Var, descend_into=(Block, Disjunct))
@@ -127,6 +129,7 @@ def _set_values(model, moving, table, columns):
         unknown.update(moving.state_jumps.copy.values())
     make_consistent(moving, list(_weights(table, columns, physical)), unknown)
     set_hysteresis(moving)
+    set_parts(moving, times)
 
 
 def _columns_of_variables(columns):

@@ -6,8 +6,12 @@ A flowsheet in SI units has enthalpies of 1e9 J beside flows of 1e-3 m3/s; witho
 
 Takes: a block whose variables have sensible values.
 Leaves: ``scaling_factor`` Suffixes, as IDAES keeps them, where a variable or constraint has no factor yet.
-Does not apply: to variables at zero, such as those of an empty vessel: they get no factor.
+Does not apply: to variables at zero, such as those of an empty vessel, and equations with variables without a value: they get no
+factor.
 """
+
+import logging
+from math import isnan, nan
 
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Constraint, Suffix, Var
@@ -15,6 +19,8 @@ from pyomo.core.base.suffix import SuffixFinder
 from pyomo.core.expr.visitor import identify_variables
 
 from pyomo_fesd.core import gradient, is_generated
+
+logger = logging.getLogger('pyomo_fesd')
 
 NAME = 'scaling_factor'
 
@@ -36,8 +42,10 @@ def scale_by_values(block, least: float = 1e-3) -> int:
     free = (v for v in variables if v.value and not v.fixed)
     new = ComponentMap((v, 1 / max(abs(v.value), least)) for v in _unscaled(free, find))
     factors = {id(v): new.get(v) or find(v) or 1.0 for v in variables}
-    equations = block.component_data_objects(Constraint, active=True, descend_into=Block)
-    new.update(_equation_factors(_unscaled(equations, find), factors))
+    equations = _unscaled(block.component_data_objects(Constraint, active=True, descend_into=Block), find)
+    found = {c: _equation_factor(c, factors) for c in equations}
+    _warn_without_value([c for c, factor in found.items() if isnan(factor)])
+    new.update((c, factor) for c, factor in found.items() if factor > 0)
     for component, factor in new.items():
         _set_factor(component, factor)
     return len(new)
@@ -47,14 +55,26 @@ def _unscaled(components, find):
     return (c for c in components if find(c) is None and not is_generated(c))
 
 
-def _equation_factors(equations, factors):
-    """Yield each equation with the factor that scales the largest entry of its gradient in scaled variables to 1."""
-    for c in equations:
-        variables = list(identify_variables(c.body, include_fixed=False))
-        slopes = gradient(c.body, variables) if variables else []
-        largest = max((abs(slope) / factors.get(id(v), 1.0) for slope, v in zip(slopes, variables)), default=0.0)
-        if largest > 0:
-            yield c, 1 / largest
+def _equation_factor(c, factors):
+    """The factor that scales the largest entry of an equation's gradient in scaled variables to 1; 0 for none, NaN if undefined."""
+    variables = list(identify_variables(c.body, include_fixed=True))
+    slopes = gradient(c.body, variables) if variables else []
+    scaled = [abs(slope) / factors.get(id(v), 1.0) for slope, v in zip(slopes, variables) if not v.fixed]
+    if any(map(isnan, scaled)):
+        return nan
+    return 1 / max(scaled) if any(scaled) else 0.0
+
+
+def _warn_without_value(equations):
+    if equations:
+        missing = [v for v in identify_variables(equations[0].body, include_fixed=True) if v.value is None]
+        logger.warning(
+            "scale_by_values: %d equations have no gradient at the present values and get no factor, such as '%s'%s. Give values "
+            "first, by an initialiser or simulate.",
+            len(equations),
+            equations[0].name,
+            f", where '{missing[0].name}' has none" if missing else '',
+        )
 
 
 def _set_factor(component, factor):

@@ -169,3 +169,16 @@ def test_a_failure_is_explained(solver, where):
     results = pyo.SolverFactory(solver).solve(m)
     assert not pyo.check_optimal_termination(results)
     assert '1 equation(s) too many' in str(getattr(results.solver, where))
+
+
+def test_equations_outside_of_the_block_are_told():
+    """Arcs on the model, and a transformed flowsheet: its streams are equations that the block does not have."""
+    m = pyo.ConcreteModel()
+    m.fs = pyo.Block()
+    m.fs.x, m.fs.y, m.fs.z = pyo.Var(), pyo.Var(), pyo.Var()
+    m.fs.law = pyo.Constraint(expr=m.fs.x + m.fs.y == 1)
+    m.stream = pyo.Constraint(expr=m.fs.x == m.fs.y)
+    found = pyomo_fesd.structure(m.fs)
+    assert found.degrees_of_freedom == 1 and names(found.outside) == ['stream']
+    assert "1 active equation(s) outside 'fs' contain its unknowns and are not counted, e.g. stream" in str(found)
+    assert not pyomo_fesd.structure(m).outside and 'outside' not in str(pyomo_fesd.structure(m))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pyomo.environ as pyo
 import pytest
 from benchmarks.hard_ocp import ball, carts, cases, discs, hopper
 from benchmarks.hard_ocp.replay import Plant, replay
@@ -134,9 +135,56 @@ def test_the_slip_of_the_hopper_is_the_velocity_of_its_foot():
     assert np.imag(foot(q + 1e-30j * v)) * 1e30 == pytest.approx(hopper.PLANT.tangent(q)[0] @ v)
 
 
-@pytest.mark.parametrize('p, form', FORMS)
-def test_each_model_takes_guessed_controls(p, form, monkeypatch):
+def shortened(p, monkeypatch):
+    """The problem with three control stages."""
     monkeypatch.setattr(p, 'STAGES', 3)
+    if p is hopper:
+        monkeypatch.setattr(p, 'WANTED', p.reference()[1:])
+    return p
+
+
+def random_state(p):
+    """q, v, u."""
+    n, drawn = len(p.START), np.random.default_rng(3)
+    return drawn.uniform(0.2, 0.9, n), drawn.uniform(-1, 1, n), drawn.uniform(-1, 1, p.CONTROLS)
+
+
+@pytest.mark.parametrize('p, form', FORMS)
+def test_each_model_takes_guessed_controls_and_is_that_of_the_replay(p, form, monkeypatch):
+    p = shortened(p, monkeypatch)
     m = p.build(form)
     cases.initialise(p, m, random_controls(p, 2))
     assert p.controls(m) == pytest.approx(random_controls(p, 2))
+
+    q, v, u = random_state(p)
+    cases.initialise(p, m, np.tile(u, (3, 1)))
+    for t in m.t:
+        for i in m.i:
+            for var, number in ((m.q, q), (m.v, v), (m.dq, v), (m.dv, p.PLANT.force(q, v, u) / p.PLANT.mass)):
+                var[i, t].set_value(float(number[i - 1]), skip_validation=True)
+    own = [c for name in ('way', 'momentum', 'along', 'up') if (c := m.component(name)) is not None]
+    assert max(abs(pyo.value(row.body) - pyo.value(row.upper)) for c in own for row in c.values()) < 1e-9
+    paid = sum(p.PLANT.rate(q, v, u, stage) for stage in range(3)) * p.HORIZON / 3
+    assert pyo.value(m.cost) == pytest.approx(paid + p.final_cost(q, v))
+
+
+@pytest.mark.parametrize('p', CASES)
+def test_the_twin_in_nosnoc_states_the_same_problem(p):
+    pytest.importorskip('nosnoc', reason='the peer is no dependency: pip install nosnoc==0.2.0')
+    import casadi as ca
+
+    q, v, u = random_state(p)
+    twin = p.twin()
+    given, speed = twin.model, 2.0
+    # in flight: above all surfaces
+    flight = given.get('z', given['alpha'][0])
+    other = [given['p_time_var']] if 'p_time_var' in given else []
+    field = ca.Function(
+        'f', [given['x'], given['u'], flight, *other], [given['f_x'][0], twin.costs['f_q'], twin.costs['f_terminal']]
+    )
+    values = ([*q, *v, 0.0], [*u, speed], [1, *[0] * (flight.numel() - 1)], *(p.WANTED[4] for _ in other))
+    rates, paid, final = field(*values)
+    expected = speed * np.array([*v, *(p.PLANT.force(q, v, u) / p.PLANT.mass), 1])
+    assert rates.full().ravel() == pytest.approx(expected)
+    assert float(paid) == pytest.approx(speed * p.PLANT.rate(q, v, u, 4))
+    assert float(final) == pytest.approx(p.final_cost(q, v))

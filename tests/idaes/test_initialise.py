@@ -17,6 +17,7 @@ from idaes.models.properties.modular_properties.base.generic_property import Gen
 from idaes.models.properties.modular_properties.examples.BT_ideal import configuration  # noqa: E402
 from idaes.models.unit_models import Flash  # noqa: E402
 
+from pyomo_fesd import casadi_ipopt  # noqa: E402
 from tests.idaes.plants import PLANTS  # noqa: E402
 
 logging.getLogger('idaes').setLevel(logging.CRITICAL)
@@ -102,3 +103,19 @@ def test_a_unit_that_cannot_be_solved_says_so(flash):
     flash.fs.flash.control_volume.properties_out[0].temperature.fix(250)
     with pytest.raises(InitializationError):
         flash.fs.flash.initialize(solver='casadi_ipopt')
+
+
+@pytest.mark.parametrize('way', ['initialize', 'objects', 'get_solver'])
+def test_scripts_that_name_the_executable_run_as_they_are(flash, way):
+    """No solver is named here: IDAES' defaults are ``ipopt`` and, in initialiser objects and their sub-models, ``ipopt_v2``."""
+    unit = flash.fs.flash
+    with casadi_ipopt.stand_in():
+        if way == 'initialize':
+            unit.initialize()
+        elif way == 'objects':
+            unit.default_initializer().initialize(unit)
+        else:
+            unit.initialize()
+            unit.heat_duty.fix(10.0)
+            pyo.assert_optimal_termination(get_solver('ipopt_v2', solver_options={'linear_solver': 'ma57'}).solve(flash))
+    assert is_solved(flash)

@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip('idaes', reason="needs the extra: pip install -e '.[idaes]'")
 
 import idaes_overflow  # noqa: E402
+from idaes.core.util import from_json, to_json  # noqa: E402
 
 import pyomo_fesd  # noqa: E402
 from tests.idaes.plants import PLANTS  # noqa: E402
@@ -77,3 +78,15 @@ def test_a_failed_element_names_the_unit():
     m.fs.cstr.outlet.flow_vol.fix(idaes_overflow.INFLOW + 4e-3)
     with pytest.raises(pyomo_fesd.FesdError, match=r'(?s)from time 150.*where one is forced, largest residuals in fs'):
         pyomo_fesd.simulate(m, m.fs.time, max_iterations=100)
+
+
+def test_values_go_through_json_and_back(tmp_path):
+    m = moving(idaes_overflow.build(), 3)
+    idaes_overflow.specify(m)
+    pyomo_fesd.units.scale_by_values(m)
+    before, file = values(m), str(tmp_path / 'values.json')
+    to_json(m, fname=file)
+    for v in m.component_data_objects(pyo.Var):
+        v.set_value(0, skip_validation=True)
+    from_json(m, fname=file)
+    assert values(m) == {**values(m), **before}

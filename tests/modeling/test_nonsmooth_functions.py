@@ -1,5 +1,7 @@
 """max, min, abs and clip for the user's own constraints (theory, eq. 8)."""
 
+from math import exp, log
+
 import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
@@ -223,3 +225,27 @@ def test_a_block_inside_a_block_over_time_will_do():
 def test_initial_and_final_values_may_occur_beside_the_present_ones():
     m = over_time(lambda b, x: maximum(b, x - b.model().x[0], 0))
     assert len(conditions(m)) == 2
+
+
+def test_a_fixed_place_of_a_discretised_space_is_a_function_of_time():
+    """p' = 1 - dp/dz from rest, upwind on one cell: p(t, 1) = 1 - exp(-t), and the kink lies where it passes 1/2."""
+    m = pyo.ConcreteModel()
+    m.t, m.z = dae.ContinuousSet(bounds=(0, 2)), dae.ContinuousSet(bounds=(0, 1))
+    m.p, m.q = pyo.Var(m.t, m.z, initialize=0), pyo.Var(m.t)
+    m.pt, m.pz = dae.DerivativeVar(m.p, wrt=m.t), dae.DerivativeVar(m.p, wrt=m.z)
+    pyo.TransformationFactory('dae.finite_difference').apply_to(m, wrt=m.z, nfe=1, scheme='BACKWARD')
+    m.flow = pyo.Constraint(m.t, rule=lambda m, t: m.pt[t, 1] == 1 - m.pz[t, 1])
+    m.inlet = pyo.Constraint(m.t, rule=lambda m, t: m.p[t, 0] == 0)
+    m.rest = pyo.Constraint(m.t, rule=lambda m, t: m.pt[t, 0] == 0 if t == 0 else pyo.Constraint.Skip)
+
+    @m.Block(m.t)
+    def relief(b, t):
+        b.law = pyo.Constraint(expr=b.model().q[t] == maximum(b, 0, b.model().p[t, 1] - 0.5))
+
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, wrt=m.t, nfe=6, ncp=3)
+    m.p[0, 1].fix(0)
+    pyomo_fesd.simulate(m, m.t)
+    time = pyomo_fesd.physical_time(m, m.t)
+    opened = max(time[t] for t in m.t if m.p[t, 1].value <= 0.5 + 1e-9)
+    assert opened == pytest.approx(log(2), abs=1e-5)
+    assert m.q[2].value == pytest.approx(0.5 - exp(-2), abs=1e-5)

@@ -42,25 +42,28 @@ def blocks(e, places=(0, 2, 4), speeds=(1, 0, 0), end=3.0):
     return m
 
 
-def discs(e, end=2.0):
-    """A disc of mass 1 that flies at one of mass 2, off its centre by 0.6 of the sum of their radii."""
-    places = {(1, 'x'): -2, (1, 'y'): 0.6, (2, 'x'): 0, (2, 'y'): 0}
+def discs(e, end=2.0, T=1, L=1, M=1):
+    """A disc of mass 1 that flies at one of mass 2, off its centre by 0.6 of the sum of their radii.
+
+    ``T``, ``L``, ``M`` are the units of time, length and mass, here and below.
+    """
+    places = {(1, 'x'): -2 * L, (1, 'y'): 0.6 * L, (2, 'x'): 0, (2, 'y'): 0}
     m = pyo.ConcreteModel()
-    m.t, m.b, m.d = dae.ContinuousSet(bounds=(0, end)), pyo.RangeSet(2), pyo.Set(initialize='xy')
+    m.t, m.b, m.d = dae.ContinuousSet(bounds=(0, end * T)), pyo.RangeSet(2), pyo.Set(initialize='xy')
     m.x = pyo.Var(m.b, m.d, m.t, initialize=lambda m, b, d, t: places[b, d])
-    m.v = pyo.Var(m.b, m.d, m.t, initialize=lambda m, b, d, t: 2.0 * ((b, d) == (1, 'x')))
+    m.v = pyo.Var(m.b, m.d, m.t, initialize=lambda m, b, d, t: 2.0 * L / T * ((b, d) == (1, 'x')))
     m.dx, m.dv = dae.DerivativeVar(m.x, wrt=m.t), dae.DerivativeVar(m.v, wrt=m.t)
     for b, d in places:
         m.x[b, d, 0].fix()
         m.v[b, d, 0].fix()
     m.distance = pyo.Expression(m.t, rule=lambda m, t: pyo.sqrt(sum((m.x[1, d, t] - m.x[2, d, t]) ** 2 for d in m.d)))
-    m.hit = pyomo_fesd.contact(m.t, gap=lambda m, t: m.distance[t] - 1, restitution=e)
+    m.hit = pyomo_fesd.contact(m.t, gap=lambda m, t: m.distance[t] - L, restitution=e)
     m.kinematics = pyo.Constraint(m.b, m.d, m.t, rule=lambda m, b, d, t: m.dx[b, d, t] == m.v[b, d, t])
 
     @m.Constraint(m.b, m.d, m.t)
     def momentum(m, b, d, t):
         normal = (m.x[b, d, t] - m.x[3 - b, d, t]) / m.distance[t]
-        return b * m.dv[b, d, t] == normal * m.hit[t].normal
+        return b * M * m.dv[b, d, t] == normal * m.hit[t].normal
 
     return m
 
@@ -71,14 +74,46 @@ def after_discs(e):
     return {(1, 'x'): 2 - 0.8 * impulse, (1, 'y'): 0.6 * impulse, (2, 'x'): 0.4 * impulse, (2, 'y'): -0.3 * impulse}
 
 
-def incline(mu, slope=0.3, end=1.5, height=0.0, speed=2.0):
+def incline(mu, slope=0.3, end=1.5, height=0.0, speed=2.0, T=1, L=1, M=1):
     """A block on an incline, thrown upwards."""
-    m = over_time(end, s=0.0, n=height, v=speed, w=0.0)
+    g = G * L / T**2
+    m = over_time(end * T, s=0.0, n=height * L, v=speed * L / T, w=0.0)
     m.plane = pyomo_fesd.contact(m.t, gap=lambda m, t: m.n[t], friction=mu, slip=lambda m, t: m.v[t])
     m.along = pyo.Constraint(m.t, rule=lambda m, t: m.ds[t] == m.v[t])
     m.across = pyo.Constraint(m.t, rule=lambda m, t: m.dn[t] == m.w[t])
-    m.slide = pyo.Constraint(m.t, rule=lambda m, t: 2 * m.dv[t] == -2 * G * sin(slope) + m.plane[t].friction)
-    m.press = pyo.Constraint(m.t, rule=lambda m, t: 2 * m.dw[t] == -2 * G * cos(slope) + m.plane[t].normal)
+    m.slide = pyo.Constraint(m.t, rule=lambda m, t: 2 * M * m.dv[t] == -2 * M * g * sin(slope) + m.plane[t].friction)
+    m.press = pyo.Constraint(m.t, rule=lambda m, t: 2 * M * m.dw[t] == -2 * M * g * cos(slope) + m.plane[t].normal)
+    return m
+
+
+def pushed(end=2.0, T=1, L=1, M=1):
+    """A block at rest on a table, pushed by a growing force: it sticks for 1, then slips with 5 (t - 1)."""
+    g, force = G * L / T**2, M * L / T**2
+    m = over_time(end * T, s=0.0, n=0.0, v=0.0, w=0.0)
+    clock = pyomo_fesd.clock(m, m.t)
+    m.table = pyomo_fesd.contact(m.t, gap=lambda m, t: m.n[t], friction=0.5, slip=lambda m, t: m.v[t])
+    m.along = pyo.Constraint(m.t, rule=lambda m, t: m.ds[t] == m.v[t])
+    m.across = pyo.Constraint(m.t, rule=lambda m, t: m.dn[t] == m.w[t])
+    m.slide = pyo.Constraint(m.t, rule=lambda m, t: 2 * M * m.dv[t] == 10 * force * clock[t] / T + m.table[t].friction)
+    m.press = pyo.Constraint(m.t, rule=lambda m, t: 2 * M * m.dw[t] == -2 * M * g + m.table[t].normal)
+    return m
+
+
+def puck(height, directions=4, turn=0.0, end=1.2, T=1, L=1, M=1):
+    """A puck that falls on ice with the speed 2 in the direction ``turn``; the axes of friction are turned by it too."""
+    c, s = round(cos(turn), 12), round(sin(turn), 12)
+    m = over_time(end * T, x=0.0, y=0.0, z=height * L, u=2 * c * L / T, v=2 * s * L / T, w=0.0)
+
+    def along(m, t):
+        return [c * m.u[t] + s * m.v[t], c * m.v[t] - s * m.u[t]]
+
+    m.ice = pyomo_fesd.contact(m.t, gap=lambda m, t: m.z[t], friction=0.25, slip=along, directions=directions)
+    for x, v in (('x', 'u'), ('y', 'v'), ('z', 'w')):
+        rate, v = m.component(f'd{x}'), m.component(v)
+        m.add_component(f'way_{x}', pyo.Constraint(m.t, rule=lambda m, t, rate=rate, v=v: rate[t] == v[t]))
+    m.push_x = pyo.Constraint(m.t, rule=lambda m, t: M * m.du[t] == c * m.ice[t].friction[1] - s * m.ice[t].friction[2])
+    m.push_y = pyo.Constraint(m.t, rule=lambda m, t: M * m.dv[t] == s * m.ice[t].friction[1] + c * m.ice[t].friction[2])
+    m.press = pyo.Constraint(m.t, rule=lambda m, t: M * m.dw[t] == -M * G * L / T**2 + m.ice[t].normal)
     return m
 
 

@@ -5,7 +5,7 @@ import pyomo.environ as pyo
 import pytest
 import signum
 
-from pyomo_fesd import FesdError
+from pyomo_fesd import FesdError, simulate
 from pyomo_fesd.simulation.determinacy import refuse_undetermined
 from tests.models import scalar_ode
 from tests.problems import air_friction, dumped, quadratic_drag, relay_of_states, resting_ball, sliding, weir
@@ -49,3 +49,38 @@ def test_a_condition_that_is_missing_is_noticed():
     m.del_component(m.overflow)
     with pytest.raises(FesdError, match='nothing determines'):
         refuse_undetermined(problems(move(m, 2, 2))[0])
+
+
+def controller(gain):
+    """dI/dt = 1, and one equation without a time for I, u and the derivative of x at the first time."""
+    m = scalar_ode(x0=0.0)
+    m.gain, m.u = pyo.Var(initialize=gain), pyo.Var(m.t, initialize=0)
+    m.gain.fix()
+    m.u[0].fix(3.0)
+    m.initial = pyo.Constraint(expr=m.y[0] == m.u[0] + m.gain * m.dx[0])
+    m.rate = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == 1)
+    m.law = pyo.Constraint(m.t, rule=lambda m, t: (m.dx[t] if t else m.u[t] - 3) == 0)
+    m.follow = pyo.Constraint(m.t, rule=lambda m, t: m.u[t] == m.y[t] if t else pyo.Constraint.Skip)
+    m.law[0].deactivate()
+    return move(m, 3)
+
+
+def test_an_equation_without_a_time_gives_an_initial_value_where_the_rest_of_it_does_not_count():
+    """The integral of a PID controller from its first output: the derivative there is unknown, with a gain of 0."""
+    m = controller(0.0)
+    simulate(m)
+    assert m.y[0].value == pytest.approx(3.0) and m.u[2].value == pytest.approx(5.0)
+
+
+def test_what_hides_an_initial_value_is_named():
+    with pytest.raises(FesdError, match=r"(?s)y\[0\].*also contains 'dx\[0\]', which nothing else.*Fix: fix.*or 'dx\[0\]'"):
+        simulate(controller(0.5))
+
+
+def test_equal_bounds_state_an_equation():
+    m = scalar_ode(x0=0.0)
+    m.y[0].fix(1.0)
+    m.rate = pyo.Constraint(m.t, rule=lambda m, t: (1, m.dx[t], 1))
+    m.other = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == m.x[t])
+    simulate(move(m, 2))
+    assert m.x[2].value == pytest.approx(2.0) and m.y[2].value == pytest.approx(3.0)

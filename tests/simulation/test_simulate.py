@@ -677,3 +677,22 @@ def test_a_start_near_a_surface(below, above, x0):
     expected = (2 + min(x0, 0) / 3 + max(x0, 0)) if above > 0 else 0
     # a start nearer than 1e-7 may count as on the surface, which shifts the solution by less than that
     assert m.x[2].value == pytest.approx(expected, abs=1e-7)
+
+
+def test_a_given_state_that_jumps_is_named_where_no_step_is_found():
+    """The state at the end of a pipe is an input, fixed to another value from the first point on; no flow a fits to its rate."""
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 1))
+    m.x, m.a = pyo.Var(m.t, initialize=1), pyo.Var(m.t, initialize=1)
+    m.dx = dae.DerivativeVar(m.x)
+    m.law = pyo.Constraint(m.t, rule=lambda m, t: m.a[t] ** 2 == 5 - m.dx[t])
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=3, ncp=2)
+    m.x.fix(9)
+    m.x[0].fix(1)
+    m.dx[0].fix(0)
+    with pytest.raises(FesdError, match=r"(?s)the state 'x\[.*\]' is given, and jumps there from 1 to 9.*a state cannot jump"):
+        pyomo_fesd.simulate(m)
+    for t in m.t:
+        m.x[t].fix(1 + 4 * t)
+    pyomo_fesd.simulate(m)
+    assert m.a[1].value == pytest.approx(1, abs=1e-5)  # labels have six decimals

@@ -8,14 +8,16 @@ import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 import thermostat
-from problems import laws
+from problems import laws, parts, two_carts
 from problems.running import move
+from pyomo.common.timing import HierarchicalTimer
 from pyomo.contrib.solver.common.factory import SolverFactory as SolverFactoryV2
 from pyomo.contrib.solver.common.results import SolutionStatus
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
 from pyomo_fesd.mpcc.algorithm import hybrid
+from pyomo_fesd.mpcc.nlp.deadline import Deadline
 from pyomo_fesd.solvers import simulated_start
 from tests.models import dcs, signum
 
@@ -153,7 +155,12 @@ def pushed_ball(target=0.5):
     return move(m, 8, 2)
 
 
-def test_a_homotopy_without_a_point_begins_again_at_a_simulation():
+@pytest.fixture
+def without_completions(monkeypatch):
+    monkeypatch.setattr(simulated_start.SimulatedStart, 'completion', lambda self, compiled: None)
+
+
+def test_a_homotopy_without_a_point_begins_again_at_a_simulation(without_completions):
     m = pushed_ball()
     results, log = solve(m)
     assert 'no feasible point, so simulated' in log
@@ -161,7 +168,7 @@ def test_a_homotopy_without_a_point_begins_again_at_a_simulation():
     assert len(times(m)) == 2 and m.u.value == pytest.approx(1.28241, abs=1e-3)
 
 
-def test_it_does_so_before_the_time_is_up(monkeypatch):
+def test_it_does_so_before_the_time_is_up(monkeypatch, without_completions):
     monkeypatch.setattr(hybrid, 'PATIENCE', 0.0)
     results, log = solve(pushed_ball(), time_limit=30)
     assert 'relaxation' not in log.split('no feasible point, so simulated')[0]
@@ -228,3 +235,31 @@ def test_a_march_whose_elements_cannot_be_even_is_a_solution():
     pyo.assert_optimal_termination(results)
     assert results.solver.nlps <= 1 and results.solver.violation <= 1e-12
     assert case.found() == pytest.approx(case.exact, abs=1e-12)
+
+
+def test_a_push_is_found_from_a_start_at_which_nothing_touches():
+    m = two_carts.build(4, 2)
+    results, log = solve(m)
+    assert results.extra_info.stationarity == 'B'
+    assert 'its controls simulated' in log
+    assert pyo.value(m.cost) < 0.1 * two_carts.UNTOUCHED
+    controls = [m.u[two_carts.END * (k + 1) / 4].value for k in range(4)]
+    assert pyo.value(m.cost) == pytest.approx(two_carts.replay(controls), abs=1e-4)
+
+
+def test_without_simulations_the_homotopy_runs_as_it_is():
+    _, log = solve(two_carts.build(4, 2), simulate_first=False, raise_exception_on_nonoptimal_result=False)
+    assert 'simulated' not in log
+
+
+def test_a_completion_leaves_the_model_as_it_was():
+    m = two_carts.build(4, 2)
+    compiled = parts.compiled(m)
+    config = SolverFactoryV2('mpec_hybrid').config
+    config.timer = HierarchicalTimer()
+    start = simulated_start.SimulatedStart(m, config, Deadline())
+    before = [(v.value, v.stale) for v in m.component_data_objects(pyo.Var)]
+    w, is_complete, _ = start.completion(compiled)(compiled.x0, 10.0)
+    assert is_complete
+    assert np.abs(np.minimum(compiled.evaluate(w).G, compiled.evaluate(w).H)).max() < 1e-9
+    assert [(v.value, v.stale) for v in m.component_data_objects(pyo.Var)] == before

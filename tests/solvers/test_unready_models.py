@@ -1,10 +1,14 @@
 """Models that a solver must not ignore parts of: refused with component, cause and fix, and left as they were."""
 
+from math import exp
+
 import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 from pyomo.gdp import Disjunct, Disjunction
+from pyomo.mpec import Complementarity, complements
 
+import pyomo_fesd
 from pyomo_fesd import FesdError
 from pyomo_fesd.solvers import refuse_unready
 
@@ -90,3 +94,54 @@ def test_a_fixed_integer_is_not_refused():
 
 def test_a_plain_model_is_ready():
     refuse_unready(model(), 'some_solver')
+
+
+def integrated(early):
+    """x' = 1 on a sub-block with its own time, and an Integral that is used, declared before or after the discretisation."""
+    m = pyo.ConcreteModel()
+    m.b = pyo.Block()
+    m.b.t = dae.ContinuousSet(bounds=(0, 1))
+    m.b.x, m.b.area = pyo.Var(m.b.t), pyo.Var()
+    m.b.dx = dae.DerivativeVar(m.b.x)
+    m.b.law = pyo.Constraint(m.b.t, rule=lambda b, t: b.dx[t] == 2 * b.x[t])
+    m.b.x[0].fix(1)
+
+    def integral():
+        m.b.sum = dae.Integral(m.b.t, rule=lambda b, t: b.x[t])
+        m.b.total = pyo.Constraint(expr=m.b.area == m.b.sum)
+
+    if early:
+        integral()
+    pyo.TransformationFactory('dae.collocation').apply_to(m, nfe=20, ncp=3)
+    if not early:
+        integral()
+    return m
+
+
+def test_an_integral_that_pyomo_dae_did_not_build_again_is_refused_and_finite_elements_cure_it():
+    m = integrated(early=True)
+    with pytest.raises(pyomo_fesd.FesdError, match=r"b.sum: this Integral is a sum over the times that 'b.t' had before"):
+        pyo.SolverFactory('casadi_ipopt').solve(m)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m)
+    pyo.SolverFactory('casadi_ipopt').solve(m)
+    assert m.b.area.value == pytest.approx((exp(2) - 1) / 2, rel=1e-7)
+
+
+def test_an_integral_over_all_times_is_an_expression_wherever_it_lies():
+    m = integrated(early=False)
+    pyo.SolverFactory('casadi_ipopt').solve(m)
+    assert m.b.area.value == pytest.approx((exp(2) - 1) / 2, rel=1e-3)  # pyomo.dae's trapezoids
+
+
+def test_pairs_with_variables_that_scale_model_has_scaled_are_refused():
+    m = pyo.ConcreteModel()
+    m.x, m.y = pyo.Var(initialize=1, bounds=(0, None)), pyo.Var(initialize=1)
+    m.pair = Complementarity(expr=complements(m.x >= 0, m.y >= 0))
+    m.sum = pyo.Constraint(expr=m.x + m.y == 1)
+    m.scaling_factor = pyo.Suffix(direction=pyo.Suffix.EXPORT)
+    m.scaling_factor[m.y] = 10
+    scaled = pyo.TransformationFactory('core.scale_model').create_using(m)
+    with pytest.raises(pyomo_fesd.FesdError, match="core.scale_model has scaled 'scaled_y' in Constraints only"):
+        pyo.SolverFactory('mpec_hybrid').solve(scaled)
+    m.scaling_factor[m.y] = 1
+    pyo.SolverFactory('mpec_hybrid').solve(pyo.TransformationFactory('core.scale_model').create_using(m))

@@ -14,7 +14,7 @@ from pyomo.contrib.piecewise import PiecewiseLinearFunction
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
-from tests.problems import air_friction, crossing, held_control, relay_of_states, sliding, two_systems, weir
+from tests.problems import air_friction, contacts, crossing, held_control, relay_of_states, sliding, two_systems, weir
 from tests.problems.running import LEGENDRE, RADAU, lengths, move, seen, transform
 
 CERTAIN = {'simulate_first': False, 'warm_start': True}
@@ -94,6 +94,30 @@ def test_state_jumps(bounced, nfe):
     if nfe == 24:
         assert differences(m, pyomo_fesd.trajectory(bounced)) < 1e-10
         assert iterations(m) == 0
+
+
+CONTACTS = {
+    'bounces': (lambda: contacts.ball(0.8, 1.5), 6),
+    'rests': (lambda: contacts.ball(0), 4),
+    'a row of blocks': (lambda: contacts.blocks(0.5), 6),
+    'friction at an impact': (lambda: contacts.incline(0.2, height=0.4), 6),
+    'friction in space': (lambda: contacts.puck(0.2), 6),
+}
+
+
+@pytest.mark.parametrize('states', [False, True])
+@pytest.mark.parametrize('name', CONTACTS)
+def test_impulses_follow_from_the_jumps_of_velocities(name, states):
+    build, nfe = CONTACTS[name]
+    m = move(build(), nfe)
+    frame = source = pyomo_fesd.simulate(m)
+    if states:
+        kept = {c.split('[')[0] for c in frame.columns if m.find_component('d' + c.split('[')[0]) is not None}
+        source = frame[[c for c in frame.columns if c.split('[')[0] in kept | {'element', 'label'}]]
+    again = move(build(), nfe)
+    pyomo_fesd.start_from(again, source)
+    assert iterations(again) == 0
+    assert differences(again, frame) < 1e-8
 
 
 def test_hysteresis():

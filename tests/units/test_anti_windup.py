@@ -33,3 +33,18 @@ def test_it_slides_where_resting_lets_the_command_fall_back():
 def test_refused():
     with pytest.raises(pyomo_fesd.FesdError, match='not below'):
         integrator(1, low=2)
+
+
+@pytest.mark.parametrize('gain', [0.0, 0.1])
+def test_a_derivative_counts_in_the_command_only_with_a_gain(gain):
+    """A PID controller whose derivative gain is fixed to 0 is a PI controller."""
+    m = plant(3, I=0.0, s=0.0)
+    m.gain = pyo.Var(initialize=gain)
+    m.gain.fix()
+    m.rest = anti_windup(m.t, integral_rate=m.dI, rate=1, command=lambda m, t: m.I[t] + m.s[t] + m.gain * m.ds[t], low=-1, high=1)
+    rate(m, 's', lambda m, t: 0.5)
+    if gain:
+        with pytest.raises(pyomo_fesd.FesdError, match="the region condition contains the derivative"):
+            pyo.TransformationFactory('fesd.dcs').apply_to(m)
+    else:
+        assert solved(m).I[3].value == pytest.approx(2 / 3, abs=1e-9)

@@ -29,3 +29,18 @@ def test_what_is_scaled_already_stays():
     assert scale_by_values(m) == 2 and scale_by_values(m) == 0
     assert m.scaling_factor[m.y] == 7.0
     assert m.b.scaling_factor[m.b.row] == pytest.approx(7e-6)
+
+
+def test_equations_without_values_get_no_factor_and_are_told(caplog):
+    m = pyo.ConcreteModel()
+    m.x, m.y, m.z = pyo.Var(initialize=100.0), pyo.Var(), pyo.Var()
+    m.z.fix()
+    m.known = pyo.Constraint(expr=m.x**2 == 1e4)
+    m.linear = pyo.Constraint(expr=4 * m.y == m.x)
+    m.unknown = pyo.Constraint(expr=pyo.log(m.y) == m.x)
+    m.given = pyo.Constraint(expr=m.z * m.x == 1)
+    assert scale_by_values(m) == 3
+    assert m.known in m.scaling_factor and m.scaling_factor[m.linear] == pytest.approx(0.01)
+    assert m.unknown not in m.scaling_factor and m.given not in m.scaling_factor
+    assert "2 equations" in caplog.text and "such as 'unknown', where 'y' has none" in caplog.text
+    assert 'ERROR' not in caplog.text

@@ -14,7 +14,7 @@ PROBLEMS = ('carts', 'discs', 'hopper', 'ball')
 GUESS = 0.1
 #: A run ends at its limit of CPU seconds; at this multiple of it the process is killed, and a run may wait for a loaded machine
 #: this many times its limit.
-KILL, WAIT = 1.5, 6
+KILL, WAIT = 1.5, 20
 
 
 def module(problem):
@@ -80,6 +80,7 @@ def with_pyomo_fesd(p, form, given, options, limit, tee=False):
         'status': str(results.solver.termination_condition),
         'certified': str(results.solver.stationarity) == 'B',
         'objective': pyo.value(m.cost),
+        'residual': results.solver.complementarity,
         'iterations': int(results.solver.nlp_iterations),
         'nlps': int(results.solver.nlps),
         'build': built - started,

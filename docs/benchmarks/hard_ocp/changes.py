@@ -20,9 +20,11 @@ PROBLEMS, FORMS = ('discs', 'hopper'), ('contact', 'time_freezing')
 KEY = ('problem', 'form', 'change')
 COLUMNS = (
     *KEY,
+    'limit',
     'status',
     'certified',
     'objective',
+    'residual',
     'replayed',
     'missed',
     'excess',

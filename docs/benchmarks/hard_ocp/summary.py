@@ -3,12 +3,14 @@
 import pandas as pd
 from benchmarks.hard_ocp.cases import PROBLEMS
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 #: Marker and colour of each method.
 METHODS = {
     'contact': {'marker': 'o', 'color': '0.15'},
     'time_freezing': {'marker': 's', 'color': '0.5'},
-    'nosnoc': {'marker': 'x', 'color': 'tab:red'},
+    'nosnoc': {'marker': '^', 'color': 'tab:red'},
 }
 #: What a problem asks for beyond its cost is met to this accuracy in the replay.
 MET = 0.05
@@ -45,24 +47,30 @@ def failures(rows):
     """The runs that are not certified (ours) or not SUCCESS (nosnoc), or whose replay misses what the problem asks for."""
     good = rows.certified.eq(True) | rows.status.eq('SUCCESS')
     bad = rows[~good | ~rows.missed.le(MET)]
-    return bad[['problem', 'method', 'seed', 'status', 'objective', 'replayed', 'missed', 'cpu']]
+    table = bad[['problem', 'method', 'seed', 'status', 'objective', 'replayed', 'missed', 'cpu']]
+    # the page cannot show a table without rows
+    return table if len(table) else pd.DataFrame([{column: 'none' if column == 'problem' else '' for column in table}])
 
 
 def draw(rows):
-    """CPU seconds and replayed cost of each run."""
+    """CPU seconds and replayed cost of each run; runs without success or a certificate are hollow."""
     figure = Figure(figsize=(9, 4), layout='constrained')
-    for axis, column, label in zip(figure.subplots(1, 2), ('cpu', 'replayed'), ('CPU seconds', 'cost of the replayed controls')):
+    axes = figure.subplots(1, 2, sharey=True)
+    for axis, column, label in zip(axes, ('cpu', 'replayed'), ('CPU seconds', 'cost of the replayed controls')):
         for k, (method, style) in enumerate(METHODS.items()):
             part = rows[rows.method == method]
             places = [PROBLEMS.index(problem) + 0.22 * (k - 1) for problem in part.problem]
-            axis.scatter(part[column], places, label=method, alpha=0.8, **style)
+            colors = [style['color'] if good else 'none' for good in part.certified.eq(True) | part.status.eq('SUCCESS')]
+            axis.scatter(part[column], places, label=method, marker=style['marker'], facecolors=colors, edgecolors=style['color'])
         axis.set_yticks(range(len(PROBLEMS)), PROBLEMS)
-        axis.invert_yaxis()
+        axis.set_ylim(len(PROBLEMS) - 0.5, -0.5)
         axis.set_xscale('log')
+        axis.xaxis.set_minor_formatter(NullFormatter())
         axis.set_xlabel(label)
         axis.grid(axis='x', color='0.9')
         axis.spines[['top', 'right']].set_visible(False)
-    figure.axes[0].legend()
+    handles = [Line2D([], [], linestyle='', label=method, **style) for method, style in METHODS.items()]
+    figure.legend(handles=handles, loc='outside upper center', ncols=len(METHODS), frameon=False)
     return figure
 
 

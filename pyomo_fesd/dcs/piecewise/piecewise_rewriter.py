@@ -198,9 +198,9 @@ def _sort(cls):
     """How a class of nodes is searched: this is asked for every node of every constraint."""
     if cls in RULES:
         return _RULE
-    if not issubclass(cls, ExpressionBase):
-        return _LEAF
-    return _NAMED if issubclass(cls, NamedExpressionData) else _OPERATION
+    if issubclass(cls, NamedExpressionData):
+        return _NAMED
+    return _OPERATION if issubclass(cls, ExpressionBase) else _LEAF
 
 
 def _complementarity_sides(condition):

@@ -9,7 +9,7 @@ from pyomo.dae import DerivativeVar
 from pyomo.gdp import Disjunct
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import FesdError
+from pyomo_fesd.core import FesdError, variables_that_count
 
 #: Components that a disjunct over time cannot contain (a Disjunct only if it belongs to another tree): cause and fix.
 REFUSED_INSIDE = {
@@ -50,7 +50,7 @@ def _refuse_active(disjunct, component, tree):
 def refuse_derivatives_in_regions(inequalities, variables) -> None:
     """Refuse region conditions (lists of ConstraintData, one a mode) that contain a derivative."""
     for con in chain(*inequalities):
-        for v in identify_variables(con.body, include_fixed=True):
+        for v in variables_that_count(con.body):
             if variables.is_derivative(v):
                 raise FesdError(
                     con,

@@ -321,22 +321,23 @@ class Branches:
         """The second NLP, after the solution ``first`` of a branch, and the decisions in force; none of ``apart``."""
         if first is None or not self._c.eta.numel():
             return first, None
-        return self._imposed(first.w, zero, ~np.asarray(apart), duals=first, **more)
+        return self._imposed(first.w, zero, ~np.asarray(apart), self._subsolves.branch, duals=first, **more)
 
     def beside(self, w):
-        """The solution of the branch that ``w`` names with the decisions that are in force there, and these; None if it has none.
+        """The result, usable or not, of the branch NLP that ``w`` names with the decisions in force there, and these.
 
-        ``w`` is exactly complementary, and its decisions hold.
+        ``w`` is exactly complementary, and its decisions hold.  None if the bounds of the branch contradict each other.
         """
-        return self._imposed(w, self._subsolves.sets(w, self._tolerances.biactive).zero, True)
+        zero = self._subsolves.sets(w, self._tolerances.biactive).zero
+        return self._imposed(w, zero, True, self._subsolves.attempt)
 
-    def _imposed(self, w, zero, among, **more):
+    def _imposed(self, w, zero, among, solve, **more):
         """A branch NLP from ``w`` with the decisions that its eta asks for, ``among`` some; a tentative one only if it can be."""
         equal = (self._c.evaluate(w).eta > self._tolerances.eta) & among
-        solved = self._subsolves.branch(w, zero, equal, 0.0, **more)
-        if solved is None and np.any(equal & self._c.tentative):
+        solved = solve(w, zero, equal, 0.0, **more)
+        if not (solved and self._subsolves.usable(solved)) and np.any(equal & self._c.tentative):
             equal = equal & ~self._c.tentative
-            solved = self._subsolves.branch(w, zero, equal, 0.0, **more)
+            solved = solve(w, zero, equal, 0.0, **more)
         return solved, equal
 
 

@@ -134,7 +134,7 @@ class Coincidences:
                 return SETTLED
             gamma = np.zeros(len(way.zero), dtype=bool)
             gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
-            sets = ActiveSets(way.zero, gamma)
+            sets = ActiveSets(self._subsolves.settled(start.w, way.zero), gamma)
             step = self._subsolves.lpec(start.w, sets, self._tolerances.radius, equal, multipliers=-start.lam_g, enough=enough)
         if not step.solved:
             return OPEN

@@ -26,6 +26,8 @@ LOOSER, GAP = 10.0, 0.5
 SHARE = 0.6
 #: A completion may take this many times as long as the relaxation before, and at least these seconds.
 LONGER, LEAST_TIME = 2.0, 2.0
+#: Branch NLPs from one relaxation: one that stops on its way has better values of the free variables, but perhaps the wrong branch.
+ATTEMPTS = 2
 #: Products of eps carry round-off.
 ROUND_OFF = 1.001
 
@@ -100,14 +102,18 @@ class Completions:
         return relaxed.w
 
     def _branch_of_completion(self, w, seconds):
-        """Solve the branch that the completion of ``w`` names."""
-        completed, is_complete, note = self._complete(w, seconds)
-        self._subsolves.note(note, completed)
-        if is_complete:
-            self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
-        solved, equal = self._branches.beside(completed)
-        if solved is not None:
-            self._keep(solved, equal)
+        """Solve the branch that the completion of ``w`` names; where that stops on its way, the completion of its end once more."""
+        for _ in range(ATTEMPTS):
+            completed, is_complete, note = self._complete(w, seconds)
+            self._subsolves.note(note, completed)
+            if is_complete:
+                self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
+            result, equal = self._branches.beside(completed)
+            if result is not None and self._subsolves.usable(result):
+                self._keep(result, equal)
+            if result is None or not result.stopped:
+                return
+            w = result.w
 
     def _keep(self, solved, equal=None):
         """Keep a feasible point that is better than the best so far; its certificate comes at the end."""

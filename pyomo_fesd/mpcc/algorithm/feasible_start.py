@@ -11,8 +11,8 @@ from pyomo_fesd.mpcc.algorithm.state import Point
 from pyomo_fesd.mpcc.nlp import NlpResult
 from pyomo_fesd.mpcc.subproblems import active_sets
 
-#: Violations below this need no NLP to be reduced.
-EXACT = 1e-9
+#: Violations below this, or below so many round-off errors of a row's terms, need no NLP to be reduced.
+EXACT, ROUND_OFF = 1e-9, 16 * np.finfo(float).eps
 
 
 def feasible_start(c, subsolves, w) -> tuple[Point | None, str]:
@@ -33,18 +33,41 @@ def feasible_start(c, subsolves, w) -> tuple[Point | None, str]:
     if not found.feasible:
         return None, f"not feasible: {_most_violated(c, w)}"
     at, tolerances = c.evaluate(w), subsolves.tolerances
-    equal, is_exact = at.eta > tolerances.eta, max(found.violation_scaled, found.complementarity_scaled) <= EXACT
+    equal, is_exact = at.eta > tolerances.eta, _is_exact(c, w, at)
     nlp = unchanged = NlpResult(w, at.f, 'start', 0, np.zeros(len(c.lbg)), np.zeros(len(w)))
     if not is_exact or np.any(np.abs(c.decided(w))[equal] > EXACT):
         zero = active_sets(at.G, at.H, tolerances.biactive).zero
         nlp = subsolves.branch(w, zero, equal, 0.0, settled=tolerances.feasibility)
-    if nlp is None and is_exact:
-        # the decisions only choose among solutions, and none of these satisfies them
+    if nlp is None and (is_exact or _is_complementary(c, w, at, c.gradients(w))):
+        # the decisions only choose among solutions, and none of these satisfies them; or Ipopt does not reach its own tolerance
+        # in rows of large terms, and the start is as feasible as any answer has to be
         nlp, equal = unchanged, np.zeros_like(equal)
     if nlp is None:
         return None, f"its branch has no solution: {_most_violated(c, w, equal)}"
     certificate = subsolves.certify(nlp, equal)
     return (Point(nlp, at.f, certificate, equal), '') if certificate.certified else (None, certificate.grade.value)
+
+
+def _is_exact(c, w, at):
+    """Whether rows, bounds and pairs hold as far as round-off lets them."""
+    gradients = c.gradients(w)
+    rows, bounds = c.violations(w, at)
+    held = bounds.max(initial=0.0) <= EXACT and np.all(rows <= _reachable(gradients[1], w))
+    return bool(held) and _is_complementary(c, w, at, gradients)
+
+
+def _is_complementary(c, w, at, gradients):
+    """Whether one side of each pair is zero as far as round-off lets it, and none negative."""
+    reachable = np.minimum(_reachable(gradients[2], w), _reachable(gradients[3], w))
+    return bool(np.all(np.abs(np.minimum(at.G, at.H)) <= reachable))
+
+
+def _reachable(J, w):
+    """The residual of each row that needs no reduction: relative to its largest slope, or round-off of its terms J_ij w_j."""
+    if 0 in J.shape:
+        return np.full(J.shape[0], EXACT)
+    slopes = np.abs(J)
+    return np.maximum(EXACT * np.maximum(1.0, slopes.max(axis=1).toarray().ravel()), ROUND_OFF * (slopes @ np.abs(w)))
 
 
 def _most_violated(c, w, equal=False):

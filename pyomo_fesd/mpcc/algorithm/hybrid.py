@@ -47,6 +47,8 @@ class HybridSolver:
         search, patient = GLOBAL_LPEC_SEARCH[self._options.lpec](self._c), setup.complete is not None
         self._branches = Branches(self._subsolves, self._gap, search, patient)
         self._coincidences = Coincidences(self._subsolves, self._branches)
+        completes = setup.complete is not None and self._c.has_objective
+        self._completions = Completions(setup, self._subsolves, self._branches) if completes else None
 
     def solve(self) -> Run:
         """Run until a point is certified, nothing is left to try, or a limit is reached."""
@@ -105,8 +107,8 @@ class HybridSolver:
 
     def _complete(self):
         """Rounds of relaxation, completion and branch, where points can be completed and something is to be minimised."""
-        if self._setup.complete is not None and self._c.has_objective:
-            Completions(self._setup, self._subsolves, self._branches).follow(self._c.x0)
+        if self._completions is not None:
+            self._completions.follow(self._c.x0)
 
     def _follow_path(self):
         """The homotopy from the start; where it finds no feasible point, from a further start."""

@@ -125,6 +125,10 @@ class Subsolves:
         sets = active_sets(at.G, at.H, tolerance)
         return replace(sets, zero=settle(self._c, self._sides, w, sets.zero))
 
+    def settled(self, w, zero):
+        """The assignment of the branch ``zero`` that starts at ``w``."""
+        return settle(self._c, self._sides, w, zero)
+
     def biactive(self, at):
         """Below this both sides of a pair may be zero at the solution: O(sqrt) of the largest product left (eq. 16)."""
         return max(BIACTIVE * np.sqrt(np.max(at.G * at.H, initial=0.0)), self.tolerances.biactive)

@@ -17,6 +17,7 @@ from pyomo_fesd.mpcc.compile.model_values import ModelValues, start_values, stat
 from pyomo_fesd.mpcc.compile.mpcc_functions import (
     ChangeIndices,
     CoincidenceIndices,
+    FillingIndices,
     FollowerIndices,
     MpccData,
     MpccFunctions,
@@ -140,6 +141,7 @@ class _Assembly:
             coincidences=[_coincidence(hint, *positions) for hint in hints.coincidences],
             arrivals=arrival_indices(hints.arrivals, *positions),
             followers=_followers(hints.followers, positions[0]),
+            fillings=_fillings(hints.fillings, *positions, scale.x),
             **values.read(),
         )
         functions = self._scaled_functions(scale, sign)
@@ -209,6 +211,18 @@ def _followers(followers, pairs):
     ]
     columns = zip(*found) if found else ((), (), ())
     return FollowerIndices(*(np.array(column, dtype=kind) for column, kind in zip(columns, (int, int, bool))))
+
+
+def _fillings(fillings, pairs, columns, s_x):
+    """The fillings by positions of pairs and variables, without those that are not complete."""
+    found = []
+    for filling in fillings:
+        of_pairs = positions_of(filling.pairs, pairs)
+        shares, extents = positions_of(filling.shares, columns), positions_of([v for _, v in filling.extents], columns)
+        if len(of_pairs) == len(filling.pairs) and len(shares) == len(extents) == len(of_pairs) + 1:
+            coefficients = np.array([coefficient for coefficient, _ in filling.extents]) / s_x[extents]
+            found.append(FillingIndices(of_pairs, shares, s_x[shares], extents, coefficients, filling.amount))
+    return found
 
 
 def _neighbour(branch, pairs, columns, s_x):

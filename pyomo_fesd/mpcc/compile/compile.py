@@ -27,6 +27,7 @@ def compile_mpcc(
     natural_units: str = USER,
     check=lambda: None,
     expanded: bool = False,
+    conditions: bool = False,
 ) -> MpccFunctions:
     """Compile ``problem``.
 
@@ -48,6 +49,8 @@ def compile_mpcc(
         called between the steps; an exception of its own ends them
     expanded : bool
         whether each function is to be a casadi graph of its own (SX), however large the model is
+    conditions : bool
+        whether ``Expr_if`` may stand in rows: kinks that nothing resolves, as in a smooth static model
 
     Raises
     ------
@@ -61,7 +64,7 @@ def compile_mpcc(
         if folder:
             nl_file.write(problem, folder)
         with phase(timer, 'read'):
-            rows = model_rows(problem, symbols)
+            rows = model_rows(problem, symbols, conditions)
         check()
         with phase(timer, 'assemble'):
             return assemble(problem, rows, symbols, factors, natural_units, expanded)

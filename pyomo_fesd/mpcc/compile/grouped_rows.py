@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from pyomo_fesd.mpcc.compile.nonlinear_parts import NonlinearParts, Unsupported, of_form
+from pyomo_fesd.mpcc.compile.nonlinear_parts import NonlinearParts, Unsupported
 from pyomo_fesd.mpcc.compile.row_classes import RowClass
 from pyomo_fesd.mpcc.compile.row_functions import RowFunctions
 
@@ -65,15 +65,15 @@ def _classes(rows, column, free, parts):
         if len(instances) < ALIKE:
             others += [instance[:2] for instance in instances]
         else:
-            classes.append(_class(form, instances, free))
+            classes.append(_class(form, instances, free, parts))
     return [*classes, _of_others(others, column, free, parts)] if others else classes
 
 
-def _class(form, instances, free):
+def _class(form, instances, free, parts):
     at, _, columns, constants = zip(*instances)
     columns, constants = np.array(columns, dtype=int).T, np.array(constants, dtype=float).reshape(len(at), -1).T
     s, c = ca.SX.sym('s', len(columns)), ca.SX.sym('c', len(constants))
-    function = ca.Function('row', [s, c], [of_form(form, ca.vertsplit(s), ca.vertsplit(c) if len(constants) else [])])
+    function = ca.Function('row', [s, c], [parts.of_form(form, ca.vertsplit(s), ca.vertsplit(c) if len(constants) else [])])
     return RowClass(function, np.array(at, dtype=int)[None, :], columns, constants, columns[:, 0] < free)
 
 

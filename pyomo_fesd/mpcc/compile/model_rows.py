@@ -54,8 +54,8 @@ class ModelRows:
     others: RowFunctions
 
 
-def model_rows(problem, symbols) -> ModelRows:
-    """Read the rows of ``problem``; ``symbols`` stand for the parameters.
+def model_rows(problem, symbols, conditions: bool = False) -> ModelRows:
+    """Read the rows of ``problem``; ``symbols`` stand for the parameters, ``conditions`` is whether ``Expr_if`` is accepted.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def model_rows(problem, symbols) -> ModelRows:
     Contradiction
         where fixed values alone violate a constraint
     """
-    model, reader = problem.model, RowReader()
+    model, reader = problem.model, RowReader(conditions)
     try:
         with auxiliary_block(problem) as block, readable(model):
             objective = [] if problem.objective is None else reader.terms(_expression_of(problem, symbols))

@@ -47,6 +47,7 @@ class MpccData:
     coincidences : list of CoincidenceIndices
     arrivals : list of ArrivalIndices
     followers : FollowerIndices
+    fillings : list of FillingIndices
     tentative : bool array, decisions that are dropped where they leave no solution
     """
 
@@ -68,6 +69,7 @@ class MpccData:
     coincidences: list
     arrivals: list
     followers: object
+    fillings: list
     tentative: np.ndarray
 
 
@@ -182,6 +184,21 @@ class FollowerIndices:
     pairs: np.ndarray
     leaders: np.ndarray
     swapped: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class FillingIndices:
+    """A ``Filling`` by positions of pairs and variables; ``coefficients`` are those of the scaled variables ``extents``.
+
+    ``scales`` are the factors of the variables ``shares``.
+    """
+
+    pairs: np.ndarray
+    shares: np.ndarray
+    scales: np.ndarray
+    extents: np.ndarray
+    coefficients: np.ndarray
+    amount: float
 
 
 class MpccFunctions:

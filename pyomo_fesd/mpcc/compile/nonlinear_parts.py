@@ -41,6 +41,8 @@ OPERATIONS = {
     'o53': (1, ca.acos),
     'o54': (None, lambda *terms: reduce(operator.add, terms)),
 }
+#: Operations of if-then-else, whose conditions are inequalities.
+CONDITIONAL = {'o21': (2, ca.logic_and), 'o22': (2, operator.lt), 'o23': (2, operator.le), 'o35': (3, ca.if_else)}
 #: A number in a template, and what stands in its place where it may differ.
 NUMBER, MARK = re.compile(r'n([^\n]+)\n'), 'c\n'
 #: Halves up to this size are structure, such as exponents and signs; all other numbers are data.
@@ -63,9 +65,16 @@ class Canonical:
 
 
 class NonlinearParts:
-    """Forms and values of nonlinear parts whose named expressions are ``named`` (the cache of ``AMPLRepnVisitor``)."""
+    """Forms and values of nonlinear parts.
 
-    def __init__(self, named):
+    Parameters
+    ----------
+    named : dict, named expressions by id, the cache of ``AMPLRepnVisitor``
+    conditions : bool, whether if-then-else is accepted
+    """
+
+    def __init__(self, named, conditions=False):
+        self._operations = OPERATIONS | (CONDITIONAL if conditions else {})
         self._named, self._split, self._templates = named, {}, {}
 
     def canonical(self, template, arguments) -> Canonical | None:
@@ -97,8 +106,28 @@ class NonlinearParts:
         """Return a part at ``values`` (casadi, by id), which gets those of its named expressions as well."""
         for k in self._inner(arguments, values):
             text, ids = self._template(k)
-            values[k] = evaluate(text, [values[i] for i in ids])
-        return evaluate(template, [values[k] for k in arguments])
+            values[k] = evaluate(text, [values[i] for i in ids], self._operations)
+        return evaluate(template, [values[k] for k in arguments], self._operations)
+
+    def of_form(self, form, variables, constants):
+        """Return the value of a canonical form at its variables and constants (lists of casadi scalars).
+
+        Raises
+        ------
+        Unsupported
+            for functions without a counterpart
+        """
+        ends, known = list(accumulate(structure.count(MARK) for structure, _ in form)), {}
+
+        def part(k):
+            if k not in known:
+                structure, places = form[k]
+                own = constants[ends[k] - structure.count(MARK) : ends[k]]
+                values = [variables[i] if i >= 0 else part(-i) for i in places]
+                known[k] = evaluate(structure, values, self._operations, own)
+            return known[k]
+
+        return part(0)
 
     def _structure(self, text):
         """The template with marks in place of the numbers that are data, and these numbers."""
@@ -151,28 +180,10 @@ def _finite(text):
     return number
 
 
-def of_form(form, variables, constants):
-    """Return the value of a canonical form at its variables and constants (lists of casadi scalars).
-
-    Raises
-    ------
-    Unsupported
-        for functions without a counterpart
-    """
-    ends, known = list(accumulate(structure.count(MARK) for structure, _ in form)), {}
-
-    def part(k):
-        if k not in known:
-            structure, places = form[k]
-            own = constants[ends[k] - structure.count(MARK) : ends[k]]
-            known[k] = evaluate(structure, [variables[i] if i >= 0 else part(-i) for i in places], own)
-        return known[k]
-
-    return part(0)
-
-
-def evaluate(text, values, constants=()):
+def evaluate(text, values, operations, constants=()):
     """Return the value of a template at the ``values`` of its arguments and the ``constants`` of its marks.
+
+    ``operations`` are those that are accepted.
 
     Raises
     ------
@@ -189,8 +200,8 @@ def evaluate(text, values, constants=()):
             stack.append(ca.SX(_finite(line[1:])))
         elif line.isdecimal():
             stack.append(int(line))
-        elif line in OPERATIONS:
-            count, operation = OPERATIONS[line]
+        elif line in operations:
+            count, operation = operations[line]
             count = stack.pop() if count is None else count
             stack.append(operation(*(stack.pop() for _ in range(count))))
         else:

@@ -62,10 +62,10 @@ class RowReader:
     parts : NonlinearParts
     """
 
-    def __init__(self):
+    def __init__(self, conditions: bool = False):
         named, self._known, self._external = {}, {}, {}
         self._visitor = AMPLRepnVisitor(named, self._external, self._known, set(), False, True, SortComponents.unsorted)
-        self.parts = NonlinearParts(named)
+        self.parts = NonlinearParts(named, conditions)
 
     def row(self, expr, factor=1) -> Row:
         """Return ``factor * expr`` as a row."""

@@ -49,9 +49,18 @@ def unsupported(model, symbols) -> FesdError:
                 return FesdError(
                     symbols.original(component),
                     f"the function '{node.getname()}' cannot be evaluated here",
-                    "write it with exp, log, sqrt or a complementarity (for if-then-else: a Disjunction)",
+                    _fix(node),
                 )
     return FesdError(model, "it contains a function that cannot be evaluated", "report this model")
+
+
+def _fix(node):
+    if isinstance(node, ExternalFunctionExpression):
+        return (
+            "casadi cannot call functions of a compiled library: take a property package whose equations are written out (as the "
+            "modular ones with an ideal equation of state), or solve this model with Ipopt's executable"
+        )
+    return "write it with exp, log, sqrt or a complementarity (for if-then-else: a Disjunction)"
 
 
 def _refuse_invalid(model):

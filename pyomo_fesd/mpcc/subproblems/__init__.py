@@ -11,6 +11,6 @@ from pyomo_fesd.mpcc.subproblems.branch import Branch
 from pyomo_fesd.mpcc.subproblems.lpec import Lpec
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.subproblems.restoration import Restoration
-from pyomo_fesd.mpcc.subproblems.side_constraints import settle, sort_sides
+from pyomo_fesd.mpcc.subproblems.side_constraints import settle, sort_sides, without_constant
 from pyomo_fesd.mpcc.subproblems.solver_cache import SolverCache
 from pyomo_fesd.mpcc.subproblems.stationarity import Certificate, Stationarity, certify_point, measure

@@ -8,13 +8,16 @@ Leaves: an NLP built once; an assignment only changes bounds.
 Does not apply: where the bounds of an assignment contradict each other; ``solve`` then returns None.
 """
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
 from pyomo_fesd.mpcc.compile import Outer, composed, csr_pattern, take
+from pyomo_fesd.mpcc.subproblems.active_set import FREE
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, infeasible
-from pyomo_fesd.mpcc.subproblems.side_constraints import settle
+from pyomo_fesd.mpcc.subproblems.side_constraints import settle, with_shares
 
 #: A branch starts near its solution: not so close to the bounds that Ipopt's steps are cut short, nor pushed far from them.
 NEAR = {
@@ -25,6 +28,8 @@ NEAR = {
     'constr_viol_tol': 1e-11,
     'compl_inf_tol': 1e-10,
 }
+#: Status of a branch that has a solution only if places of fillings are open.
+UNDECIDED = 'fillings undecided'
 #: A row without free variables, or one of more equations than free variables, may miss its bounds by this much.
 ROW_TOLERANCE = 1e-9
 
@@ -72,8 +77,46 @@ class Branch:
         -------
         NlpResult, or None if the assignment contradicts the bounds
         """
+        options = equal, weight, box, duals, max_iter, settled
+        result = self._solve(w, zero, *options)
+        if not self._c.fillings or (result is not None and result.solved):
+            return result
+        return self._solve_refilled(w, zero, result, options)
+
+    def _solve_refilled(self, w, zero, result, options):
+        """Solve the branch with the sides of fillings that its places show once they satisfy the decisions.
+
+        Where that fails, a solution with open fillings shows that the branch may have one with other sides.
+        """
+        pairs, (equal, _, box, *_) = np.concatenate([f.pairs for f in self._c.fillings]), options
+        if np.any(zero[pairs] == FREE):
+            return result
+        again = self._solve(self._with_decisions(w, equal, box), zero, *options)
+        if again is not None and again.solved:
+            return again
+        without = zero.copy()
+        without[pairs] = FREE
+        free = self._solve(w, without, *options)
+        return result if free is None or not free.solved else replace(result or free, status=UNDECIDED)
+
+    def _with_decisions(self, w, equal, box):
+        """``w`` with the nearest extents of places that satisfy the decisions, and the rows that contain nothing else."""
+        c, extents = self._c, np.unique(np.concatenate([f.extents for f in self._c.fillings]))
+        if box is not None:
+            w = np.clip(w, *box)
+            extents = extents[box[0][extents] < box[1][extents]]
+        at, (_, J_g, _, _, J_equal) = c.evaluate(w), c.gradients(w)
+        others = np.setdiff1d(np.arange(len(w)), np.concatenate([f.extents for f in c.fillings]))
+        own = (c.lbg == c.ubg) & (np.abs(J_g[:, others]).sum(axis=1).A1 == 0) & (np.abs(J_g[:, extents]).sum(axis=1).A1 > 0)
+        equal = np.zeros(c.equal.numel(), dtype=bool) if equal is None else equal
+        A = sparse.vstack([J_g[own][:, extents], J_equal[equal][:, extents]]).toarray()
+        new = w.copy()
+        new[extents] += np.linalg.lstsq(A, np.concatenate([(c.lbg - at.g)[own], -c.decided(w)[equal]]), rcond=None)[0]
+        return np.clip(new, c.lbx, c.ubx)
+
+    def _solve(self, w, zero, equal, weight, box, duals, max_iter, settled):
         c = self._c
-        zero = settle(c, self._sides, w, zero)
+        zero, w = settle(c, self._sides, w, zero), with_shares(c.fillings, w)
         bounds = self._bounds(zero)
         if bounds is None:
             return None

@@ -17,6 +17,8 @@ from pyomo_fesd.mpcc.subproblems.active_set import FREE, G_ZERO, H_ZERO
 EXACT = 1e-12
 #: A constant side is zero below this.
 SETTLED = 1e-9
+#: An amount this near to the end of a place, relative to all places, may belong to either side of it.
+TIE = 1e-7
 #: A follower does not agree with its leader if the side that should be zero is above this.
 OPEN = 1e-3
 
@@ -91,9 +93,9 @@ def sort_sides(c) -> Sides:
 def settle(c, sides, w, zero):
     """The assignment ``zero`` without sides that other pairs decide.
 
-    Followers get the sides of their leaders.  The bounds that a branch fixes may make a side constant.  If that is zero, its pair
-    holds, and a row for the other side would only take away room.  (Both sides of such a pair are zero at many solutions, and
-    round-off would choose.)
+    Followers get the sides of their leaders, fillings those that the extents in ``w`` show.  The bounds that a branch fixes may
+    make a side constant.  If that is zero, its pair holds, and a row for the other side would only take away room.  (Both sides of
+    such a pair are zero at many solutions, and round-off would choose.)
 
     Parameters
     ----------
@@ -102,7 +104,7 @@ def settle(c, sides, w, zero):
         values of the variables that the assignment does not fix
     zero : int array (q)
     """
-    zero = _follow(c.followers, zero)
+    zero = _filled(c.fillings, w, _follow(c.followers, zero))
     lbx, ubx = sides.bounds(zero, c.lbx, c.ubx)
     constant = sides.constant(lbx == ubx)
     needs_row = sides.zero_rows(zero) & (sides.row_of >= 0)
@@ -119,6 +121,27 @@ def _follow(followers, zero):
     """The assignment in which followers have the sides of their leaders."""
     new = zero.copy()
     new[followers.pairs] = _led(followers, zero)
+    return new
+
+
+def _filled(fillings, w, zero):
+    """The assignment in which each place but the last of a filling is full; at the end of a place the side is kept."""
+    new = zero.copy()
+    for filling in fillings:
+        extents = filling.coefficients * w[filling.extents]
+        beyond = filling.amount - np.cumsum(extents)[:-1]
+        clear = (np.abs(beyond) > TIE * extents.sum()) & (zero[filling.pairs] != FREE)
+        new[filling.pairs[clear]] = np.where(beyond > 0, G_ZERO, H_ZERO)[clear]
+    return new
+
+
+def with_shares(fillings, w):
+    """``w`` with the shares that the extents in it show."""
+    new = w.copy()
+    for filling in fillings:
+        extents = filling.coefficients * w[filling.extents]
+        before = filling.amount - np.concatenate([[0.0], np.cumsum(extents)[:-1]])
+        new[filling.shares] = np.clip(before / np.maximum(extents, TIE * extents.sum()), 0.0, 1.0) * filling.scales
     return new
 
 

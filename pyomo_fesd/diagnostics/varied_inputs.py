@@ -1,0 +1,83 @@
+"""Inputs whose fixed values differ inside a control stage: they belong to labels, which are not physical time once elements move.
+
+    u(t) = u_k,   S_{k-1} < t <= S_k        what a held input is: one value, that at the end S_k of its control stage too
+
+Takes: a solved model with a moving grid whose lengths are variables.
+Leaves: messages.
+Does not apply: to the first time, to signals (their times are boundaries that stay), and to variables that are free somewhere in a
+control stage.
+"""
+
+from collections.abc import Iterator
+
+from pyomo.common.collections import ComponentSet
+from pyomo.core import Block, Var
+from pyomo.dae import ContinuousSet
+from pyomo.gdp import Disjunct
+
+from pyomo_fesd.core import MovingGrid, TimeIndex, is_generated, moving_grids, signals, strip_time
+from pyomo_fesd.results import SwitchingFunction
+
+#: Relative difference of values that are equal.
+SAME = 1e-9
+#: Inputs that are named.
+SHOWN = 3
+AT_THE_END = (
+    "the label of a boundary belongs to the control stage that ends there: fix the new value at later labels only (t > {time:g})"
+)
+INSIDE = (
+    "values at labels move with the elements: let the step be a boundary that stays, with pyomo_fesd.signal(..., kind='stepped')"
+)
+
+
+def varied_inputs(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
+    """Yield a message for each of the first inputs with different values inside one control stage."""
+    moving = moving_grids(model)[wrt]
+    if all(r.fixed for r in moving.r.values()):
+        return
+    time, found = moving.physical_time(), 0
+    for name, by_time in _fixed(model, wrt):
+        first = next(filter(None, (_varied(by_time, stage) for stage in _stages(moving))), None)
+        if first is not None and found < SHOWN:
+            found += 1
+            labels, step = first
+            remedy = AT_THE_END.format(time=time[step]) if step == labels[-1] else INSIDE
+            yield (
+                f"{strip_time(name)}: it is fixed to {by_time[labels[0]].value:.6g} and, from the label {step:g} on, to "
+                f"{by_time[step].value:.6g} inside the control stage that ends at time {time[labels[-1]]:.6g}; {remedy}."
+            )
+
+
+def _fixed(model, wrt):
+    """``(name, {label: data})`` of the user's variables over time that are fixed after the first time."""
+    known, first = ComponentSet(signals(wrt)), wrt.first()
+    datas = (
+        v
+        for component in model.component_objects(Var, descend_into=(Block, Disjunct))
+        if component not in known and not is_generated(component)
+        for v in component.values()
+        if v.fixed and v.value is not None
+    )
+    for name, by_time in TimeIndex(wrt).families(datas).items():
+        by_time.pop(first, None)
+        yield name, by_time
+
+
+def _stages(moving: MovingGrid) -> Iterator[tuple[float, ...]]:
+    """The labels of each control stage, without its beginning."""
+    for elements in moving.grid.stages.values():
+        yield tuple(label for e in elements for label in e.own_labels)
+
+
+def _varied(by_time, labels):
+    """The labels at which the input is given in a control stage and that of the first other value; None where there is none."""
+    given = [label for label in labels if label in by_time]
+    if not given or given[-1] != labels[-1]:
+        return None
+    start = by_time[given[0]].value
+    step = next((label for label in given if _differ(by_time[label].value, start)), None)
+    return None if step is None else (given, step)
+
+
+def _differ(a, b):
+    return abs(a - b) > SAME * max(abs(a), abs(b))

@@ -1,0 +1,62 @@
+"""Contacts on curved surfaces: drifts of the positions, with which velocities keep the order of the scheme (theory, eq. 22).
+
+Takes: contacts whose gap is nonlinear in the positions.
+Leaves: ``drift`` (mu) and ``closed`` by contact, element and point on the block of the state jumps, and mu in the collocation
+equations of the positions.
+Does not apply: where the gap is linear, as the normal velocity is 0 by itself.
+"""
+
+from pyomo.common.collections import ComponentSet
+from pyomo.core import Block, Constraint, Set, Var, quicksum
+from pyomo.core.expr.visitor import identify_variables, replace_expressions
+
+from pyomo_fesd.core import MovingGrid, TimeIndex, is_discretisation_equation
+from pyomo_fesd.finite_elements.impulse_balance import BoundaryEquations
+
+#: Keeps the drift 0 where gap and force are both 0.
+NOWHERE = 1e-12
+
+
+def stabilise(moving: MovingGrid) -> None:
+    """Keep the order on curved contacts: in a closed element the normal velocity is 0 at the collocation points too (eq. 22).
+
+    Where the gap is linear in the positions, that follows from gap = 0.
+    """
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    curved = [] if impacts is None else [law for law in impacts.laws if _is_curved(law)]
+    if not curved:
+        return
+    block, times = impacts.block, TimeIndex(moving.wrt)
+    block.point = Set(initialize=range(1, len(moving.grid.tau) + 1))
+    block.drift = Var(block.contact, moving.block.element, block.point, initialize=0, dense=False)
+    block.closed = Constraint(block.contact, moving.block.element, block.point)
+    equations = BoundaryEquations(block.model(), times, {t for e in moving.grid.elements for t in e.points})
+    shifts = {}
+    for law in curved:
+        for element in moving.grid.elements:
+            _stabilise_element(block, law, element, equations, shifts)
+    _shift_positions(block.model(), shifts)
+
+
+def _is_curved(law):
+    # positions that are fixed, as at the first time, count as numbers
+    return any(gap.polynomial_degree() not in (0, 1) for gap in law.gaps.values())
+
+
+def _stabilise_element(block, law, element, equations, shifts):
+    gap = quicksum(law.gaps[t] for t in dict.fromkeys((element.left, *element.points)))
+    force = quicksum(law.normals[t] for t in element.points)
+    for r, t in enumerate(element.points, start=1):
+        drift = block.drift[law.name, element.n, r]
+        gamma = equations.normal_velocity(law.gaps[t], law.normals[t].parent_block(), ComponentSet())
+        # the opposite sign of gamma would allow a drift that keeps the gap closed while the bodies approach, where both are small
+        block.closed.add((law.name, element.n, r), ((gap + NOWHERE) * drift - force * gamma) / (gap + force + NOWHERE) == 0)
+        for xdot, slope in equations.gradient(law.gaps[t]):
+            shifts[id(xdot)] = shifts.get(id(xdot), xdot) + slope * drift
+
+
+def _shift_positions(model, shifts):
+    """Add the drifts to the rates of the positions, in the discretisation equations only."""
+    for equation in model.component_data_objects(Constraint, active=True, descend_into=Block):
+        if is_discretisation_equation(equation) and any(id(v) in shifts for v in identify_variables(equation.body)):
+            equation.set_value(replace_expressions(equation.expr, shifts))

@@ -1,0 +1,42 @@
+"""Friction impulses: against the slip velocity after an impact (theory, eq. 23).
+
+Takes: the ``directions`` that ``impact_laws`` has put in place of the multipliers of friction, and the conditions of these.
+Leaves: ``slip`` by condition and boundary.
+"""
+
+from pyomo.common.collections import ComponentSet
+from pyomo.core.expr.visitor import identify_variables, replace_expressions
+from pyomo.mpec import complements
+
+from pyomo_fesd.core import FesdError, MovingGrid
+from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
+
+
+def add_friction_impulses(moving: MovingGrid, conditions: list[TimeComplementarity]) -> None:
+    """Add the pairs of friction impulses: those of the friction forces, with the slip velocities after the impact (eq. 23).
+
+    Raises
+    ------
+    FesdError
+        for directions of contact forces that depend on algebraic variables, or on slip velocities that do not follow from states
+    """
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    for element in moving.grid.elements[1:] if impacts is not None else ():
+        found = ComponentSet()
+        directions = impacts.directions[element.n - 1]
+        for condition in conditions if directions else ():
+            pair = condition.sides.get(element.left)
+            own = [] if pair is None else [v for v in identify_variables(pair[0]) if v in directions]
+            if own and condition.continuous[1]:
+                swap = {id(nu): directions[nu] for nu in own}
+                after = condition.starts.get(element.n, pair)[1]
+                impacts.block.slipping.add(condition.name)
+                impacts.slip.add((condition.name, element.n - 1), complements(replace_expressions(pair[0], swap) >= 0, after >= 0))
+                found.update(own)
+        other = next((nu for nu in directions if nu not in found), None)
+        if other is not None:
+            raise FesdError(
+                other,
+                "contact: the direction of a contact force depends on it, and no law says its value at an impact",
+                "write directions as functions of positions, and slip velocities as functions of differential states",
+            )

@@ -1,0 +1,82 @@
+"""Rounds of relaxation, completion and branch: kept if feasible and better, certified at the end."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pyomo.environ as pyo
+import pytest
+from problems import small_mpccs
+from problems.parts import parts
+
+from pyomo_fesd.mpcc.algorithm.completions import AROUND, Completions
+from pyomo_fesd.mpcc.nlp.deadline import Deadline
+from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
+from pyomo_fesd.solvers.options import MpecHybridConfig
+
+
+def two_minima():
+    """0 <= x perp y >= 0 with the minima (0, 1), 1, and (1, 0), 1/2."""
+    m = small_mpccs.pair(0.0, 1.0)
+    m.f = pyo.Objective(expr=(m.x - 1) ** 2 + (m.y - 1) ** 2 / 2)
+    return m
+
+
+def completions(complete, deadline=None, **options):
+    """The Parts of ``two_minima`` and its Completions by ``complete``, a function of x."""
+    p, asked = parts(two_minima()), []
+    names = [v.name for v in p.compiled.variables]
+
+    def whole(w, seconds):
+        asked.append(seconds)
+        x, is_complete = complete(w[names.index('x')])
+        return np.array(p.point(x=x, y=0.0 if x > 0 else 1.0)), is_complete, "completed"
+
+    config = MpecHybridConfig()
+    config.set_value(options)
+    setup = SimpleNamespace(
+        compiled=p.compiled, options=config, complete=whole, after=lambda run: None, deadline=deadline or Deadline()
+    )
+    return p, Completions(setup, p.subsolves, p.branches), asked
+
+
+def test_the_branch_of_the_completion_is_solved_and_certified():
+    p, rounds, _ = completions(lambda x: (max(x, 0.1), True))
+    rounds.follow(p.compiled.x0)
+    assert p.run.point.certificate.grade is Stationarity.B
+    assert p.run.point.f == pytest.approx(0.5)
+
+
+def test_a_point_that_is_not_complete_still_names_a_branch():
+    p, rounds, _ = completions(lambda x: (0.3, False))
+    rounds.follow(p.compiled.x0)
+    assert p.run.point.f == pytest.approx(0.5)
+
+
+def test_a_completion_is_kept_as_it_is_if_its_branch_is_no_better():
+    p, rounds, _ = completions(lambda x: (1.0, True))
+    rounds._branch_of_completion(p.compiled.x0, 1.0)
+    assert p.run.point.f == pytest.approx(0.5)
+    assert p.run.point.certificate.grade is Stationarity.UNTRIED
+
+
+def test_rounds_go_around_the_best_point_and_end_without_progress():
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    rounds.follow(p.compiled.x0)
+    eps = [entry.eps for entry in p.kinds('relaxation')]
+    assert eps[:4] == pytest.approx([1, 1e-1, 1e-2, 1e-3])
+    assert eps[4:] == pytest.approx(AROUND)
+
+
+@pytest.mark.parametrize('part, follows', [(0.4, True), (0.6, False)])
+def test_a_second_path_follows_where_relaxations_promise_less_than_half(part, follows):
+    p, rounds, _ = completions(lambda x: (0.0, True))
+    rounds._round(p.compiled.x0, 1e-1)
+    rounds._promise = part * p.run.point.f
+    assert rounds._promising() is follows
+
+
+def test_no_round_begins_after_the_deadline():
+    p, rounds, asked = completions(lambda x: (0.3, True), deadline=Deadline.after(0.0))
+    rounds.follow(p.compiled.x0)
+    assert not asked
+    assert p.run.point is None
