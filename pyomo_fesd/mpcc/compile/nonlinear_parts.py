@@ -43,6 +43,8 @@ OPERATIONS = {
 }
 #: Operations of if-then-else, whose conditions are inequalities.
 CONDITIONAL = {'o21': (2, ca.logic_and), 'o22': (2, operator.lt), 'o23': (2, operator.le), 'o35': (3, ca.if_else)}
+#: An if-then-else whose condition is no inequality.
+OTHER_CONDITION = re.compile(r'o35\n(?!o2[123]\n)')
 #: A number in a template, and what stands in its place where it may differ.
 NUMBER, MARK = re.compile(r'n([^\n]+)\n'), 'c\n'
 #: Halves up to this size are structure, such as exponents and signs; all other numbers are data.
@@ -190,6 +192,8 @@ def evaluate(text, values, operations, constants=()):
     Unsupported
         for functions without a counterpart
     """
+    if OTHER_CONDITION.search(text):
+        raise Unsupported('o35')
     values, constants, stack = list(values), list(constants), []
     for line in reversed(text.replace('%s', 'v\n').splitlines()):
         if line == 'v':

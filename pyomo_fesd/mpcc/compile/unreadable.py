@@ -4,7 +4,13 @@ import logging
 
 import numpy as np
 from pyomo.core import Block, Constraint, Objective, Param, Var, value
-from pyomo.core.expr import Expr_ifExpression, ExternalFunctionExpression, UnaryFunctionExpression
+from pyomo.core.expr import (
+    Expr_ifExpression,
+    ExternalFunctionExpression,
+    InequalityExpression,
+    RangedExpression,
+    UnaryFunctionExpression,
+)
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core import FesdError
@@ -44,14 +50,21 @@ def unsupported(model, symbols) -> FesdError:
     """Return the error that names the component with a function that is not compiled; ``symbols`` are those of parameters."""
     _refuse_invalid(model)
     for component in model.component_data_objects(active=True, descend_into=Block):
-        for node in _nodes(component):
-            if _is_unsupported(node):
-                return FesdError(
-                    symbols.original(component),
-                    f"the function '{node.getname()}' cannot be evaluated here",
-                    _fix(node),
-                )
+        found = [node for node in _nodes(component) if _is_unsupported(node)]
+        if found:
+            # the worst first: others may be accepted
+            return FesdError(symbols.original(component), *min(map(_cause_and_fix, found), key=_is_of_conditional))
     return FesdError(model, "it contains a function that cannot be evaluated", "report this model")
+
+
+def _is_of_conditional(cause_and_fix):
+    return "'Expr_if'" in cause_and_fix[0]
+
+
+def _cause_and_fix(node):
+    if isinstance(node, Expr_ifExpression) and not isinstance(node.arg(0), (InequalityExpression, RangedExpression)):
+        return "an if-then-else whose condition is no inequality", "write the condition as an inequality"
+    return f"the function '{node.getname()}' cannot be evaluated here", _fix(node)
 
 
 def _fix(node):
