@@ -11,7 +11,16 @@ record), ``multistart``.  The plug-ins of ``pyomo_fesd.solvers`` put them togeth
 """
 
 from pyomo_fesd.mpcc.algorithm import HybridSolver, Outcome, Run, Setup, Tolerances
-from pyomo_fesd.mpcc.compile import NATURAL_UNITS, Contradiction, Snapshot, compile_mpcc, parameter_data, read_mpcc, start_value
+from pyomo_fesd.mpcc.compile import (
+    NATURAL_UNITS,
+    Contradiction,
+    Snapshot,
+    compile_mpcc,
+    parameter_data,
+    plain_nlp,
+    read_mpcc,
+    start_value,
+)
 from pyomo_fesd.mpcc.multistart import Multistart
 from pyomo_fesd.mpcc.nlp import Deadline, OutOfTime, PlainIpopt
 from pyomo_fesd.mpcc.reporting import Loader, LogTable, RunRecord, StartsTable, fill_results, log_streams, reporter

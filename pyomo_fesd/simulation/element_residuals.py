@@ -66,7 +66,7 @@ class ElementResiduals:
         copy.add_pairs('cross', pattern.cross_pairs)
         known = list(copy.model.known.values())
         self._c = c = compile_mpcc(
-            read_mpcc(copy.model), timer, parameters=known, user_scaling=user_scaling, natural_units='starts'
+            read_mpcc(copy.model), timer, parameters=known, user_scaling=user_scaling, natural_units='starts', expanded=True
         )
         self._order = np.array([v.index() for v in c.variables], dtype=int)
         self.length = next((j for j, v in enumerate(c.variables) if v is copy.length), None)

@@ -22,7 +22,7 @@ from pyomo.contrib.solver.common.results import Results, SolutionStatus, Termina
 from pyomo.core import Block
 
 from pyomo_fesd.core import REDIRECTION, FesdError, interruptible, phase
-from pyomo_fesd.mpcc import Contradiction, Loader, OutOfTime, PlainIpopt, compile_mpcc, read_mpcc
+from pyomo_fesd.mpcc import Contradiction, Loader, OutOfTime, PlainIpopt, compile_mpcc, plain_nlp, read_mpcc
 from pyomo_fesd.results import set_indicators
 from pyomo_fesd.solvers.plugin import CasadiSolver, LegacyPlugin, deadline, with_structure
 from pyomo_fesd.solvers.singular_start import with_perturbation
@@ -172,7 +172,8 @@ def _run(compiled, options, streams, deadline):
         budget['max_wall_time'] = max(deadline.left(), 1e-3)
     log, c = io.StringIO(), compiled
     with _captured(log, streams, budget | options):
-        ipopt = PlainIpopt('ipopt', c.x, c.p, c.f, c.g, budget, options=options)
+        nlp = plain_nlp(c)
+        ipopt = PlainIpopt('ipopt', nlp.x, nlp.p, nlp.f, nlp.g, budget, derivatives=nlp.derivatives, options=options)
         answer = ipopt.solve(c.x0, c.parameters, c.lbx, c.ubx, c.lbg, c.ubg)
     return answer, log.getvalue()
 

@@ -36,8 +36,8 @@ COLUMNS = ('workload', 'label', 'runs', 'total', *PARTS)
 #: Parts that the timer of ``mpec_hybrid`` measures -> the paths of its phases, added, and those inside them, subtracted.
 PHASES = {
     'march': ([('simulate',)], []),
-    'write': ([('compile', 'write')], []),
-    'import': ([('compile',), ('refresh',)], [('compile', 'write')]),
+    'write': ([('compile', 'read')], []),
+    'import': ([('compile',), ('refresh',)], [('compile', 'read')]),
     'LPEC': ([('lpec',)], []),
     'review': ([('review',)], []),
 }

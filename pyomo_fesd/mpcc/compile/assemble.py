@@ -1,9 +1,10 @@
-"""The MPCC in the solver's scaled variables w and parameters p, from the content of the NL file.
+"""The MPCC in the solver's scaled variables w and parameters p, from its rows.
 
 Its free variables are w / s_x, its parameters p; then f s_f, g s_g, G s_G and H s_H are functions of (w, p).
 """
 
 from collections import defaultdict
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -11,6 +12,7 @@ from pyomo.core import maximize
 from scipy import sparse
 
 from pyomo_fesd.mpcc.compile.arrival_indices import arrival_indices, both_positions, moves, positions_of
+from pyomo_fesd.mpcc.compile.casadi_matrices import csr
 from pyomo_fesd.mpcc.compile.model_values import ModelValues, start_values, stated_bounds
 from pyomo_fesd.mpcc.compile.mpcc_functions import (
     ChangeIndices,
@@ -20,13 +22,11 @@ from pyomo_fesd.mpcc.compile.mpcc_functions import (
     MpccData,
     MpccFunctions,
     NeighbourIndices,
-    csr,
-    take,
 )
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
-from pyomo_fesd.mpcc.compile.nl_index import NlIndex
 from pyomo_fesd.mpcc.compile.parameters import parameter_values
-from pyomo_fesd.mpcc.compile.round_off import EXACT, parameter_terms
+from pyomo_fesd.mpcc.compile.round_off import EXACT
+from pyomo_fesd.mpcc.compile.scaled_functions import LARGE, ScaledFunctions, ScaledRows
 from pyomo_fesd.mpcc.compile.scaling import Scale, side_factors
 from pyomo_fesd.mpcc.compile.sizes import row_factors, variable_factors, without_small
 
@@ -37,172 +37,155 @@ SMALL = 100
 AUTO, STARTS, COEFFICIENTS, USER = NATURAL_UNITS = ('auto', 'starts', 'coefficients', 'user')
 
 
-def assemble(problem, entries, nl, symbols, factors, natural):
-    """The ``MpccFunctions`` of ``problem``, whose ``entries`` are in ``nl``; ``factors`` are the user's.
+def assemble(problem, rows, symbols, factors, natural, expanded=False):
+    """The ``MpccFunctions`` of ``problem`` from its ``ModelRows``; ``factors`` are the user's.
 
-    ``natural`` says by what the others are scaled, as in ``compile_mpcc``.
+    ``natural`` says by what the others are scaled, as in ``compile_mpcc``; functions are SX if ``expanded``.
     """
-    index = NlIndex(nl, entries, symbols.variables)
     by_starts = natural == STARTS or (natural == AUTO and bool(problem.hints.alike))
-    compiled = _assembled(problem, entries, nl, symbols, factors, index, by_starts)
+    assembly = _Assembly(problem, rows, symbols, factors, expanded)
+    scaled = assembly.by_starts() if by_starts else assembly.by_user()
+    compiled = assembly.functions(scaled)
     if natural == USER:
         return compiled
     by_coefficients = natural == COEFFICIENTS or (natural == AUTO and not by_starts and _shows_sizes(compiled))
     units = natural_units(compiled, not by_coefficients)
-    return compiled if units.ordinary else _assembled(problem, entries, nl, symbols, factors, index, by_starts, units)
+    return compiled if units.ordinary else assembly.functions(scaled.in_units(units))
 
 
 def _shows_sizes(compiled):
     """Whether coefficients show the sizes: of nonlinear models they say too little in large ones, and in simulations."""
-    optimises = compiled.has_objective and compiled.G.numel() > 0
-    return optimises and (compiled.linear or compiled.x.numel() <= SMALL)
+    optimises = compiled.has_objective and compiled.pairs > 0
+    return optimises and (compiled.linear or len(compiled.x0) <= SMALL)
 
 
-def _assembled(problem, entries, nl, symbols, factors, index, by_starts, units=None):
-    variables = [nl.variables[j] for j in index.free]
-    constraints = [symbols.original(nl.constraints[i]) for i in index.model_rows]
-    pairs = index.distinct()
-    conditions = [entries.conditions[k] for k in pairs]
-    sides = np.concatenate([index.G[pairs], index.H[pairs]])
-    start, _ = start_values(variables)
+@dataclass(frozen=True)
+class _Factors:
+    """Factors of variables (n), rows (m) and the objective, and the objective's offset."""
 
-    at = start, parameter_values(symbols.parameters)
-    given = factors.of(variables), factors.of(constraints)
-    s_x, s_g = _factors_by_size(nl, index, sides, at, variables, *given, problem.hints) if by_starts else given
-    s_f, offset = float(factors.of([problem.objective])[0]), 0.0
-    if units is not None:
-        s_x, s_g, s_f, offset = s_x * units.x, s_g * units.g, s_f * units.f, units.offset
-    w, p, f, rows, stack = _substitute(nl, index, s_x)
-    S, given = take(stack, sides), factors.of([c.source for c in conditions] * 2)
-    s_sides = _factors_of_expressions(S, (w, p), (start * s_x, at[1]), given)
-    scale = Scale(s_x, s_g, s_f, _with_factors_of_variables(s_sides, sides, index, s_x), offset)
+    x: np.ndarray
+    g: np.ndarray
+    f: float
+    offset: float = 0.0
 
-    positions = _positions_of(conditions), {id(v): [j] for j, v in enumerate(variables)}
-    guides = [problem.hints.guide_bounds.get(v.parent_component(), UNBOUNDED) for v in variables]
-    values = ModelValues(
-        variables, symbols.parameters, _are_sides(sides, index), np.array(guides, dtype=float).reshape(-1, 2), s_x, entries.splits
-    )
-    data = MpccData(
-        lbg=nl.lbg[index.model_rows] * scale.g,
-        ubg=nl.ubg[index.model_rows] * scale.g,
-        side_of=sides,
-        sign=-1.0 if problem.objective is not None and problem.objective.sense == maximize else 1.0,
-        has_objective=problem.objective is not None,
-        scale=scale,
-        tentative=np.array([d.tentative for d in problem.decisions], dtype=bool),
-        neighbours=_neighbours(problem.hints.neighbour_branches, *positions, s_x),
-        coincidences=[_coincidence(hint, *positions) for hint in problem.hints.coincidences],
-        arrivals=arrival_indices(problem.hints.arrivals, *positions),
-        followers=_followers(problem.hints.followers, positions[0]),
-        fillings=_fillings(problem.hints.fillings, *positions, s_x),
-        **values.read(),
-    )
-    gauges = take(stack, index.gauges)
-    gauges = gauges * _factors_of_expressions(gauges, (w, p), (start * s_x, at[1]), np.ones(gauges.numel()))
-    outputs = _outputs(index, f, rows, stack, S, scale, gauges)
-    return MpccFunctions(w, p, outputs, data, variables, constraints, conditions, problem.decisions, values)
+    def in_units(self, units):
+        """The product with ``NaturalUnits``."""
+        return _Factors(self.x * units.x, self.g * units.g, self.f * units.f, units.offset)
 
 
-def _factors_by_size(nl, index, sides, at, variables, given_x, given_g, hints):
-    """Factors of variables and of the model's rows: the user's, or by their sizes where these are far from 1."""
-    w, p, _, rows, stack = _substitute(nl, index, np.ones(len(variables)))
-    all_rows = ca.vertcat(rows, take(stack, sides))
-    function = ca.Function('rows', [w, p], [all_rows, ca.jacobian(all_rows, w)])
-    bounds = np.concatenate([nl.lbg[index.model_rows], np.zeros(len(sides))])
-    begin = without_small(at[0])
-    cancelling = np.concatenate([nl.cancelling[index.model_rows], _of_rows(nl.cancelling, sides)])
-    cancelling = np.maximum(cancelling, parameter_terms(all_rows, w, p, begin, at[1]))
-    J, constants = _linearised(function, begin, at[1], bounds, cancelling)
-    # sides are zero at solutions, and so may be what is left of them
-    certain = constants.copy()
-    certain[len(index.model_rows) :] = without_small(certain[len(index.model_rows) :])
-    columns = {id(v): j for j, v in enumerate(variables)}
-    alike = [[columns[id(v)] for v in group if id(v) in columns] for group in hints.alike]
-    s_x = variable_factors(J, (certain, constants), at[0], stated_bounds(variables), given_x, [group for group in alike if group])
-    J = csr(function(*at)[1])[: len(index.model_rows)]
-    return s_x, row_factors(J @ sparse.diags(1 / s_x), given_g)
+class _Assembly:
+    """The functions of one MPCC, whatever their factors."""
+
+    def __init__(self, problem, rows, symbols, factors, expanded):
+        self._problem, self._rows, self._factors = problem, rows, factors
+        self._parameters = symbols.parameters
+        self._variables, self._constraints = rows.variables, [symbols.original(c) for c in rows.constraints]
+        self._q = len(rows.conditions)
+        self._start, _ = start_values(self._variables)
+        self._p = parameter_values(self._parameters)
+        size = sum(functions.size for functions in (rows.cost, rows.rows, rows.sides, rows.others))
+        self._kind = ca.SX if expanded or size <= LARGE else ca.MX
+
+    def by_user(self):
+        """The user's factors of variables, rows and objective."""
+        of = self._factors.of
+        return _Factors(of(self._variables), of(self._constraints), float(of([self._problem.objective])[0]))
+
+    def by_starts(self):
+        """The same, or by sizes where these are far from 1 and the user gave none."""
+        user, m = self.by_user(), len(self._constraints)
+        J, constants = self._linearised(without_small(self._start))
+        # sides are zero at solutions, and so may be what is left of them
+        certain = constants.copy()
+        certain[m:] = without_small(certain[m:])
+        columns = {id(v): j for j, v in enumerate(self._variables)}
+        alike = [[columns[id(v)] for v in group if id(v) in columns] for group in self._problem.hints.alike]
+        alike = [group for group in alike if group]
+        s_x = variable_factors(J, (certain, constants), self._start, stated_bounds(self._variables), user.x, alike)
+        J = csr(self._rows.rows.jacobian(self._at(self._start)))
+        return replace(user, x=s_x, g=row_factors(J @ sparse.diags(1 / s_x), user.g))
+
+    def _linearised(self, w):
+        """Jacobian of rows and sides, and the sizes of their distances from bounds where the variables are 0.
+
+        Rounding errors are 0, and a constant in which terms cancel has their size.
+        """
+        at, both, sides = self._at(w), (self._rows.rows, self._rows.sides), 2 * self._q
+        count = len(self._constraints) + sides
+        J = sparse.vstack([csr(functions.jacobian(at)) for functions in both]).tocsr()[:count]
+        parts = [(_column(functions.values(at)), functions.parameter_terms(at)) for functions in both]
+        values, terms = (np.concatenate(some)[:count] for some in zip(*parts))
+        found, bounds = values - J @ w, np.concatenate([self._rows.lbg, np.zeros(sides)])
+        constants = np.abs(found - np.where(np.isfinite(bounds), bounds, 0.0))
+        exact = constants > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
+        return J, np.maximum(np.where(exact, constants, 0.0), np.maximum(self._rows.cancelling, terms))
+
+    def _at(self, w):
+        return ca.DM(np.concatenate([w, self._p]).tolist())
+
+    def functions(self, factors):
+        """The ``MpccFunctions`` with these factors."""
+        rows, problem, hints = self._rows, self._problem, self._problem.hints
+        scale, values = self._scale(factors), self._model_values(factors.x)
+        sign = -1.0 if problem.objective is not None and problem.objective.sense == maximize else 1.0
+        positions = _positions_of(rows.conditions), {id(v): [j] for j, v in enumerate(self._variables)}
+        data = MpccData(
+            lbg=rows.lbg * scale.g,
+            ubg=rows.ubg * scale.g,
+            side_of=rows.side_of,
+            sign=sign,
+            has_objective=problem.objective is not None,
+            scale=scale,
+            tentative=np.array([d.tentative for d in problem.decisions], dtype=bool),
+            neighbours=_neighbours(hints.neighbour_branches, *positions, scale.x),
+            coincidences=[_coincidence(hint, *positions) for hint in hints.coincidences],
+            arrivals=arrival_indices(hints.arrivals, *positions),
+            followers=_followers(hints.followers, positions[0]),
+            fillings=_fillings(hints.fillings, *positions, scale.x),
+            **values.read(),
+        )
+        functions = self._scaled_functions(scale, sign)
+        return MpccFunctions(functions, data, self._variables, self._constraints, rows.conditions, problem.decisions, values)
+
+    def _scale(self, factors):
+        """Factors of sides besides the others: a side that is a plain variable has that variable's."""
+        sides, plain = self._of_expressions(self._rows.sides, factors.x)[: 2 * self._q], self._rows.plain
+        given = self._factors.of([c.source for c in self._rows.conditions] * 2)
+        sides = side_factors(sides, given)
+        of_variables = np.concatenate([factors.x, np.ones(len(self._p))])
+        sides[plain >= 0] = of_variables[plain[plain >= 0]]
+        return Scale(factors.x, factors.g, factors.f, sides, factors.offset)
+
+    def _of_expressions(self, functions, s_x):
+        """The largest entry of the gradient of each function at the start; 0 where it has none."""
+        J = abs(csr(functions.jacobian(self._at(self._start))) @ sparse.diags(1 / s_x))
+        largest = J.max(axis=1).toarray().ravel() if 0 not in J.shape else np.zeros(J.shape[0])
+        return np.where(np.isfinite(largest), largest, 0.0)
+
+    def _scaled_functions(self, scale, sign):
+        rows, d = self._rows, len(self._problem.decisions)
+        # the number in the objective changes, so that nothing is lost to round-off
+        cost = replace(rows.cost, constants=rows.cost.constants - [sign * scale.offset, 0.0])
+        gauges = self._of_expressions(rows.others, scale.x)[d:]
+        decided = np.ones(d)
+        parts = (
+            (cost, np.array([sign * scale.f, scale.f])),
+            (rows.rows, scale.g),
+            (rows.sides, np.concatenate([scale.sides, decided])),
+            (rows.others, np.concatenate([decided, side_factors(gauges, np.ones(len(gauges)))])),
+        )
+        return ScaledFunctions(*(ScaledRows(*part, scale.x) for part in parts), self._q, self._kind)
+
+    def _model_values(self, s_x):
+        guides, sides = self._problem.hints.guide_bounds, np.zeros(len(self._variables), dtype=bool)
+        plain = self._rows.plain
+        sides[plain[(plain >= 0) & (plain < len(sides))]] = True
+        guide = np.array([guides.get(v.parent_component(), UNBOUNDED) for v in self._variables], dtype=float).reshape(-1, 2)
+        return ModelValues(self._variables, self._parameters, sides, guide, s_x, self._rows.splits)
 
 
-def _of_rows(values, addresses):
-    """The values (one each row of the file) of those addresses that are rows, 0 for the others."""
-    is_row = (addresses >= 0) & (addresses < len(values))
-    return np.where(is_row, np.append(values, 0.0)[np.where(is_row, addresses, -1)], 0.0)
-
-
-def _linearised(function, w, p, bounds, cancelling):
-    """Jacobian of rows, and the sizes of their distances from ``bounds`` where the variables are 0, without rounding errors.
-
-    A constant in which terms of the sizes ``cancelling`` cancel has their size.
-    """
-    values, J = function(w, p)
-    J = csr(J)
-    found = np.asarray(values, dtype=float).ravel() - J @ w
-    constants = np.abs(found - np.where(np.isfinite(bounds), bounds, 0.0))
-    exact = constants > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
-    return J, np.maximum(np.where(exact, constants, 0.0), cancelling)
-
-
-def _substitute(nl, index, s_x):
-    """w, p, and in terms of them f, the model's own rows and the stack of entries."""
-    w, p = ca.SX.sym('w', len(index.free)), ca.SX.sym('p', len(index.parameters))
-    x = ca.SX(len(nl.variables), 1)
-    x[index.free.tolist()], x[index.parameters.tolist()] = w / s_x, p
-    f, g = nl.function(x)
-    # constants of a linear row are part of its bound; entries have a lower one
-    constants = np.where(np.isfinite(nl.lbg), nl.lbg, 0.0)
-    return w, p, f, take(g, index.model_rows), index.stack(g - constants, x)
-
-
-def _factors_of_expressions(S, arguments, at, given):
-    """Factors as if no side were a plain variable: the user's, or a mild gradient."""
-    if not S.numel():
-        return np.ones(0)
-    J = csr(ca.Function('sides', arguments, [ca.jacobian(S, arguments[0])])(*at))
-    largest = np.abs(J).max(axis=1).toarray().ravel() if J.shape[1] else np.zeros(J.shape[0])
-    return side_factors(np.where(np.isfinite(largest), largest, 0.0), given)
-
-
-def _with_factors_of_variables(factors, sides, index, s_x):
-    """A side that is a plain variable has that variable's factor."""
-    columns, of_all, factors = index.columns(sides), np.ones(index.size), factors.copy()
-    of_all[index.free] = s_x
-    plain = columns >= 0
-    factors[plain] = of_all[columns[plain]]
-    return factors
-
-
-def _are_sides(sides, index):
-    """Which free variables are sides themselves; ``sides`` are addresses."""
-    columns, among = index.columns(sides), np.zeros(index.size, dtype=bool)
-    among[columns[columns >= 0]] = True
-    return among[index.free]
-
-
-def _outputs(index, f, rows, stack, S, scale, gauges):
-    """The functions of the MPCC, in the order of ``MpccFunctions.NAMES``."""
-    S, q = S * scale.sides, S.numel() // 2
-    # term by term: the sum's order is that of the terms
-    penalty = sum((stack[int(k)] for k in index.penalty), ca.SX(0))
-    eta, equal = take(stack, index.eta), take(stack, index.equal)
-    f = _without(f, scale.offset)
-    return [f * scale.f, penalty * scale.f, rows * scale.g, S[:q], S[q:], eta, equal, gauges]
-
-
-def _without(f, offset):
-    """f - offset; where f is a sum with a number, the number changes, so that nothing is lost to round-off."""
-    if offset == 0.0:
-        return f
-    number, rest = 0.0, [f]
-    terms = []
-    while rest:
-        term = rest.pop()
-        if term.is_constant():
-            number += float(term)
-        elif term.is_op(ca.OP_ADD):
-            rest += [term.dep(1), term.dep(0)]
-        else:
-            terms.append(term)
-    return sum(terms, ca.SX(number - offset))
+def _column(values):
+    return values.full().ravel()
 
 
 def _positions_of(conditions):

@@ -1,20 +1,17 @@
-"""Compile an MPCC: Pyomo's NL writer -> casadi -> SX functions with exact sparse derivatives.
+"""Compile an MPCC: Pyomo's expressions -> classes of rows -> casadi functions with exact sparse derivatives.
 
-The NL file holds the model's own rows, then one row for every side of a pair that is not a plain variable, one for every
-decision and one for every penalty term (``auxiliary_rows``).  casadi reads it (``nl_file``), each of these gets its address
-(``nl_index``), and all of it becomes one scaled function (``assemble``).  Relaxations, branches and the LPEC are all formed from
-the same SX graph, so neither another eps nor another branch needs another compilation.
+The model's own rows, sides of pairs, decisions and penalty terms are read as linear and nonlinear parts (``row_reader``,
+``entries``).  Nonlinear parts of equal form become one class with one derivative (``grouped_rows``), and all of it becomes one
+scaled function (``assemble``).  Relaxations, branches and the LPEC are all formed from these functions, so neither another eps nor
+another branch needs another compilation.
 """
 
-from pyomo.common.errors import InfeasibleConstraintException
 from pyomo.common.timing import HierarchicalTimer
 
-from pyomo_fesd.core import DeferredInterrupt, phase, refuse_foreign
+from pyomo_fesd.core import DeferredInterrupt, phase
 from pyomo_fesd.mpcc.compile import nl_file
 from pyomo_fesd.mpcc.compile.assemble import USER, assemble
-from pyomo_fesd.mpcc.compile.auxiliary_rows import auxiliary_rows
-from pyomo_fesd.mpcc.compile.conditionals import conditionals, resolved
-from pyomo_fesd.mpcc.compile.model_values import Contradiction
+from pyomo_fesd.mpcc.compile.model_rows import model_rows
 from pyomo_fesd.mpcc.compile.mpcc_functions import MpccFunctions
 from pyomo_fesd.mpcc.compile.parameters import parameter_symbols
 from pyomo_fesd.mpcc.compile.read_mpcc import Mpcc
@@ -29,6 +26,7 @@ def compile_mpcc(
     user_scaling: bool = True,
     natural_units: str = USER,
     check=lambda: None,
+    expanded: bool = False,
     conditions: bool = False,
 ) -> MpccFunctions:
     """Compile ``problem``.
@@ -38,7 +36,7 @@ def compile_mpcc(
     problem : Mpcc
     timer : HierarchicalTimer
     folder : path, optional
-        where the NL file is to be written and kept; default: a temporary one
+        where an NL file of the model is to be written and kept; default: there is none
     parameters : list of VarData and ParamData
         fixed variables and mutable Params whose values may change in later solves
     user_scaling : bool
@@ -49,6 +47,8 @@ def compile_mpcc(
         linear or small), 'user' (nothing: they stay as they are, and so does the objective, which gets its unit in the other cases)
     check : callable
         called between the steps; an exception of its own ends them
+    expanded : bool
+        whether each function is to be a casadi graph of its own (SX), however large the model is
     conditions : bool
         whether ``Expr_if`` may stand in rows: kinks that nothing resolves, as in a smooth static model
 
@@ -60,38 +60,11 @@ def compile_mpcc(
         where fixed values alone violate a constraint
     """
     factors = UserFactors(user_scaling)
-    with (
-        DeferredInterrupt() as interrupt,
-        parameter_symbols(problem.model, parameters) as symbols,
-        auxiliary_rows(problem, symbols) as entries,
-        interrupt.raising(),
-    ):
-        nl = _read(problem.model, symbols, timer, folder, check, conditions)
+    with DeferredInterrupt() as interrupt, parameter_symbols(problem.model, parameters) as symbols, interrupt.raising():
+        if folder:
+            nl_file.write(problem, folder)
+        with phase(timer, 'read'):
+            rows = model_rows(problem, symbols, conditions)
         check()
         with phase(timer, 'assemble'):
-            return assemble(problem, entries, nl, symbols, factors, natural_units)
-
-
-def _read(model, symbols, timer, folder, check, conditions):
-    """The model as an ``NlModel``; where it is refused for an ``Expr_if``, again without these, if they are accepted."""
-    try:
-        return _through_file(model, symbols, timer, folder, check)
-    except nl_file.HasConditions as refused:
-        if not conditions:
-            raise refused.error from None
-    with conditionals(model) as found:
-        return resolved(found, _through_file(model, symbols, timer, folder, check))
-
-
-def _through_file(model, symbols, timer, folder, check):
-    """The model, with its auxiliary rows, as an ``NlModel``."""
-    with DeferredInterrupt() as interrupt, nl_file.folder_for(folder) as target, interrupt.raising():
-        with phase(timer, 'write'):
-            try:
-                path, variables, constraints = nl_file.write(model, target)
-            except InfeasibleConstraintException as error:
-                raise Contradiction(str(error)) from None
-        refuse_foreign(variables, model.model(), model)
-        check()
-        with phase(timer, 'import'):
-            return nl_file.read(model, symbols, path, variables, constraints)
+            return assemble(problem, rows, symbols, factors, natural_units, expanded)

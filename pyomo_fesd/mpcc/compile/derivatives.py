@@ -13,10 +13,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from pyomo_fesd.mpcc.compile.casadi_matrices import between
+
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Gradient of f, Jacobian of g, and Hessian of ``lam_f f + lam_g g`` (upper triangle) of an NLP, all SX."""
+    """Gradient of f, Jacobian of g, and Hessian of ``lam_f f + lam_g g`` (upper triangle) of an NLP."""
 
     gradient: object
     jacobian: object
@@ -27,19 +29,39 @@ class Derivatives:
 
 @dataclass(frozen=True)
 class Outer:
-    """Functions of inner functions z and slacks s (SX symbols): ``cost`` C and ``rows`` T."""
+    """Functions of inner functions z, slacks s and a parameter (SX): ``cost`` C, ``rows`` T and ``weight`` of the penalty."""
 
     z: object
     s: object
+    parameter: object
     cost: object
     rows: object
+    weight: object = 1.0
+
+    def at(self, z, s, parameter, lam_f, lam) -> dict:
+        """Return values and derivatives by (z, s) at expressions."""
+        both, of_f, of_rows = ca.vertcat(self.z, self.s), ca.SX.sym('lam_f'), ca.SX.sym('lam', self.rows.numel())
+        cost = ca.SX(self.cost)
+        lagrangian = of_f * cost + _dot(of_rows, self.rows)
+        pieces = {
+            'weight': ca.SX(self.weight),
+            'cost': cost,
+            'rows': self.rows,
+            'cost_gradient': ca.gradient(cost, both),
+            'rows_jacobian': ca.jacobian(self.rows, both),
+            'factors': ca.gradient(lagrangian, self.z),
+            'hessian': ca.hessian(lagrangian, both)[0],
+        }
+        inputs, values = [self.z, self.s, self.parameter, of_f, of_rows], [z, s, parameter, lam_f, lam]
+        return {name: _at(piece, inputs, values) for name, piece in pieces.items()}
 
 
 @dataclass(frozen=True)
 class Nlp:
-    """``min f(w; p)`` with rows g(w; p), all SX, and their derivatives."""
+    """``min f(x; p)`` with rows g(x; p), and their derivatives."""
 
     x: object
+    p: object
     f: object
     g: object
     derivatives: Derivatives
@@ -53,66 +75,87 @@ def automatic(x: ca.SX, f: ca.SX, g: ca.SX) -> Derivatives:
 
 
 class ModelDerivatives:
-    """First and second derivatives of a compiled MPCC's functions.
+    """A compiled MPCC's functions and derivatives at expressions w and p.
 
     Attributes
     ----------
-    f, penalty : SX (n), gradients
-    g, z : SX, Jacobians; z = (G, H, equal)
+    f, penalty, g, G, H, equal : values
+    z : (G, H, equal)
+    gradient_f, gradient_penalty : columns
+    J_g, J_z : Jacobians
     """
 
-    def __init__(self, c):
-        self._c = c
-        self.f, self.penalty = ca.gradient(c.f, c.x), ca.gradient(c.penalty, c.x)
-        self.parts = [ca.jacobian(e, c.x) for e in (c.g, c.G, c.H, c.equal)]
-        self.g, self.z = self.parts[0], ca.vertcat(*self.parts[1:])
-        self._hessian = None
+    def __init__(self, functions, w, p):
+        self._functions, self._at = functions, (w, p)
+        self.__dict__.update(functions.outputs(w, p))
+        self.z = ca.vertcat(self.G, self.H, self.equal)
+        cost = functions.cost.jacobian(w, p)
+        self.gradient_f, self.gradient_penalty = cost[0, :].T, cost[1, :].T
+        self.J_g, self.J_z = functions.rows.jacobian(w, p), functions.sides.jacobian(w, p)
 
     def hessian(self, of_f, of_penalty, of_g, of_z):
-        """Hessian of the model's functions with these factors."""
-        if self._hessian is None:
-            c = self._c
-            symbols = [ca.SX.sym('s'), ca.SX.sym('t'), ca.SX.sym('y', c.g.numel()), ca.SX.sym('z', self.z.shape[0])]
-            inner = ca.vertcat(c.G, c.H, c.equal)
-            lagrangian = symbols[0] * c.f + symbols[1] * c.penalty + _dot(symbols[2], c.g) + _dot(symbols[3], inner)
-            self._hessian = ca.Function('hessian', [c.x, c.p, *symbols], [ca.hessian(lagrangian, c.x)[0]])
-        return self._hessian(self._c.x, self._c.p, of_f, of_penalty, of_g, of_z)
+        """Return the upper triangle of the Hessian of the functions with these factors."""
+        c = self._functions
+        parts = (c.cost, ca.vertcat(of_f, of_penalty)), (c.rows, of_g), (c.sides, of_z)
+        return sum((rows.hessian(*self._at, factors) for rows, factors in parts[1:]), parts[0][0].hessian(*self._at, parts[0][1]))
 
 
-def composed(c, weight, outer: Outer) -> Nlp:
+def composed(c, outer: Outer) -> Nlp:
     """Compose the ``Nlp`` of a compiled MPCC with the functions ``outer`` of its pairs and slacks by the chain rule.
 
     Parameters
     ----------
     c : MpccFunctions
-    weight : SX or number, of the penalty
     outer : Outer
     """
-    d, inner = c.derivatives, ca.vertcat(c.G, c.H, c.equal)
-    m, s = c.g.numel(), outer.s
-    lam_f, lam_g = ca.SX.sym('lam_f'), ca.SX.sym('lam_g', m + outer.rows.numel())
-    both = ca.vertcat(outer.z, s)
-    lagrangian = lam_f * outer.cost + _dot(lam_g[m:], outer.rows)
-    pieces = {
-        'cost': outer.cost,
-        'rows': outer.rows,
-        'cost_gradient': ca.gradient(outer.cost, both),
-        'rows_jacobian': ca.jacobian(outer.rows, both),
-        'factors': ca.gradient(lagrangian, outer.z),
-        'hessian': ca.hessian(lagrangian, both)[0],
-    }
-    at = dict(zip(pieces, ca.substitute(list(pieces.values()), [outer.z], [inner])))
-    chain = ca.diagcat(d.z, ca.SX.eye(s.numel()))
-    gradient = ca.vertcat(d.f + weight * d.penalty, ca.SX(s.numel(), 1)) + chain.T @ at['cost_gradient']
-    jacobian = ca.vertcat(ca.horzcat(d.g, ca.SX(m, s.numel())), at['rows_jacobian'] @ chain)
-    model = d.hessian(lam_f, lam_f * weight, lam_g[:m], at['factors'])
-    hessian = ca.diagcat(model, ca.SX(s.numel(), s.numel())) + chain.T @ at['hessian'] @ chain
+    kind, n, m, own = c.kind, len(c.x0), len(c.lbg), outer.parameter.numel()
+    ns, rows = outer.s.numel(), outer.rows.numel()
+    x, p = kind.sym('x', n + ns), kind.sym('p', own + len(c.parameters))
+    lam_f, lam_g = kind.sym('lam_f'), kind.sym('lam_g', m + rows)
+    d = c.at(between(x, 0, n), between(p, own, p.numel()))
+    at = outer.at(d.z, between(x, n, n + ns), between(p, 0, own), lam_f, between(lam_g, m, m + rows))
+    chain = ca.diagcat(d.J_z, kind.eye(ns))
+    gradient = ca.vertcat(d.gradient_f + at['weight'] * d.gradient_penalty, kind(ns, 1)) + chain.T @ at['cost_gradient']
+    jacobian = ca.vertcat(ca.horzcat(d.J_g, kind(m, ns)), at['rows_jacobian'] @ chain)
+    model = d.hessian(lam_f, lam_f * at['weight'], between(lam_g, 0, m), at['factors'])
+    hessian = ca.diagcat(model, kind(ns, ns)) + ca.triu(chain.T @ at['hessian'] @ chain)
     return Nlp(
-        ca.vertcat(c.x, s),
-        c.f + weight * c.penalty + at['cost'],
-        ca.vertcat(c.g, at['rows']),
-        Derivatives(gradient, jacobian, ca.triu(hessian), lam_f, lam_g),
+        x,
+        p,
+        d.f + at['weight'] * d.penalty + at['cost'],
+        ca.vertcat(d.g, at['rows']),
+        Derivatives(gradient, jacobian, hessian, lam_f, lam_g),
     )
+
+
+def plain_nlp(c) -> Nlp:
+    """Return the ``Nlp`` of a compiled model without pairs."""
+    nothing = ca.SX(0, 1)
+    return composed(c, Outer(ca.SX.sym('z', c.inner), nothing, nothing, ca.SX(0), nothing, 0.0))
+
+
+def with_parts(nlp: Nlp, up, down) -> Nlp:
+    """Return the least sum of parts that are added to the rows ``up`` and subtracted from the rows ``down`` of an ``Nlp``."""
+    n, m, kind = nlp.x.numel(), nlp.g.numel(), type(nlp.x)
+    rows, signs = [*up.tolist(), *down.tolist()], [1.0] * len(up) + [-1.0] * len(down)
+    E = ca.DM.triplet(rows, list(range(len(rows))), signs, m, len(rows))
+    x, d = kind.sym('x', n + len(rows)), nlp.derivatives
+    lam_f, lam_g = kind.sym('lam_f'), kind.sym('lam_g', m)
+    inner = ca.Function('inner', [nlp.x, nlp.p, d.lam_f, d.lam_g], [nlp.g, d.jacobian, d.hessian])
+    g, jacobian, hessian = inner.call([between(x, 0, n), nlp.p, kind(0), lam_g], kind is ca.MX, False)
+    gradient = ca.vertcat(kind(n, 1), kind.ones(len(rows), 1))
+    derivatives = Derivatives(
+        gradient, ca.horzcat(jacobian, kind(E)), ca.diagcat(hessian, kind(len(rows), len(rows))), lam_f, lam_g
+    )
+    parts = between(x, n, x.numel())
+    return Nlp(x, nlp.p, ca.sum1(parts), g + ca.mtimes(E, parts), derivatives)
+
+
+def _at(expression, inputs, values):
+    """An SX expression at ``values``, of which only those that it depends on are evaluated."""
+    used = [k for k, symbol in enumerate(inputs) if symbol.numel() and ca.depends_on(expression, symbol)]
+    function = ca.Function('piece', [inputs[k] for k in used], [expression])
+    return function.call([values[k] for k in used])[0] if used else type(values[0])(ca.evalf(expression))
 
 
 def _dot(factors, rows):

@@ -206,8 +206,7 @@ class MpccFunctions:
 
     Parameters
     ----------
-    x, p : SX, symbols of the variables w (n) and of the parameters (l)
-    outputs : list of SX, in terms of these: f, penalty, g (m), G, H (q), eta, equal (one each decision), gauges
+    functions : ScaledFunctions
     data : MpccData
     variables : list of VarData, length n
     constraints : list of ConstraintData, length m (rows of g)
@@ -218,26 +217,29 @@ class MpccFunctions:
 
     Attributes
     ----------
-    x : SX (n);  p : SX (l);  f, penalty : SX scalars;  g : SX (m);  G, H : SX (q);  eta, equal : SX (one each decision);
-    gauges : SX (one each)
+    kind : type of symbols, ca.SX or ca.MX
+    pairs : int, q
+    inner : int, number of the functions (G, H, equal)
+    x, p : symbols of the variables w (n) and of the parameters (l)
+    f, penalty, g, G, H, eta, equal, gauges : expressions of them
     """
 
-    NAMES = ('f', 'penalty', 'g', 'G', 'H', 'eta', 'equal', 'gauges')
-
-    def __init__(self, x, p, outputs, data, variables=(), constraints=(), conditions=(), decisions=(), model_values=None):
-        self._data = data
+    def __init__(self, functions, data, variables=(), constraints=(), conditions=(), decisions=(), model_values=None):
+        self._functions, self._data = functions, data
         self.__dict__.update(vars(data))
         self.variables, self.constraints, self.conditions, self.decisions = variables, constraints, conditions, decisions
         self._model_values = model_values
-        self.x, self.p = x, p
-        for name, expression in zip(self.NAMES, outputs):
-            setattr(self, name, expression)
-        self._values = ca.Function('values', [self.x, self.p], [self.f, self.g, self.G, self.H, self.eta])
+        self.kind, self.pairs, self.inner = functions.kind, functions.pairs, 2 * functions.pairs + functions.decisions
+        self.x, self.p = self.kind.sym('w', len(self.x0)), self.kind.sym('p', len(self.parameters))
+        self.__dict__.update(functions.outputs(self.x, self.p))
+
+    def at(self, w, p) -> ModelDerivatives:
+        """Return the functions and their derivatives at expressions ``w`` and ``p``."""
+        return ModelDerivatives(self._functions, w, p)
 
     @cached_property
-    def derivatives(self):
-        """Derivatives of all functions, built when they are first needed."""
-        return ModelDerivatives(self)
+    def _values(self):
+        return ca.Function('values', [self.x, self.p], [self.f, self.g, self.G, self.H, self.eta])
 
     @cached_property
     def _equal(self):
@@ -248,24 +250,33 @@ class MpccFunctions:
         return ca.Function('gauges', [self.x, self.p], [ca.densify(self.gauges)])
 
     @cached_property
-    def _gradients(self):
-        return ca.Function('gradients', [self.x, self.p], [self.derivatives.f, *self.derivatives.parts])
+    def _jacobian(self):
+        """Function of the nonzeros of the Jacobians of f, g, G, H and equal, and the matrices that they belong to."""
+        c, at, q = self._functions, (self.x, self.p), self.pairs
+        sides = c.sides.jacobian(*at)
+        matrices = [c.cost.jacobian(*at)[0, :], c.rows.jacobian(*at), sides[:q, :], sides[q : 2 * q, :], sides[2 * q :, :]]
+        return ca.Function('jacobian', list(at), [J.nz[:] for J in matrices]), [_Pattern(J.sparsity()) for J in matrices]
 
-    @cached_property
-    def linear(self):
+    @property
+    def linear(self) -> bool:
         """Whether all rows and sides are linear."""
-        rows = ca.vertcat(self.g, self.G, self.H)
-        return not (rows.numel() and any(ca.which_depends(rows, self.x, 2, True)))
+        return not (self._functions.rows.functions.nonlinear.any() or self.nonlinear_sides.any())
+
+    @property
+    def nonlinear_sides(self) -> np.ndarray:
+        """Mask over the sides (2q) that are not linear."""
+        return self._functions.sides.functions.nonlinear[: 2 * self.pairs]
+
+    def parameter_terms(self, w) -> np.ndarray:
+        """Return the sizes of the terms of parameters in g and in the sides at ``w``."""
+        parts = [rows.parameter_terms(w, self.parameters) for rows in (self._functions.rows, self._functions.sides)]
+        return np.concatenate(parts)[: len(self.lbg) + 2 * self.pairs]
 
     def __getstate__(self):
-        # casadi pickles functions, not expressions
-        outputs = [getattr(self, name) for name in self.NAMES]
-        return ca.Function('mpcc', [self.x, self.p], outputs), self._data
+        return self._functions, self._data
 
     def __setstate__(self, state):
-        graph, data = state
-        x, p = ca.SX.sym('w', graph.size1_in(0)), ca.SX.sym('p', graph.size1_in(1))
-        self.__init__(x, p, graph(x, p), data)
+        self.__init__(*state)
 
     def refresh(self):
         """Read bounds, start and parameters from the model again; see ``ModelValues.read``."""
@@ -299,7 +310,7 @@ class MpccFunctions:
     def nonzeros(self):
         """Number of entries of each Jacobian."""
         names = ('objective', 'constraints', 'G', 'H', 'decisions')
-        return {name: self._gradients.sparsity_out(i).nnz() for i, name in enumerate(names)}
+        return {name: pattern.nonzeros for name, pattern in zip(names, self._jacobian[1])}
 
     def evaluate(self, w) -> Evaluation:
         """f, g, G, H and eta at ``w``."""
@@ -316,8 +327,10 @@ class MpccFunctions:
 
     def gradients(self, w):
         """Gradient of f (array) and Jacobians of g, G, H and the decisions' equations (scipy csr) at ``w``."""
-        grad, *jacobians = self._gradients(w, self.parameters)
-        return np.asarray(grad, dtype=float).ravel(), *(csr(J) for J in jacobians)
+        function, patterns = self._jacobian
+        numbers = (np.asarray(v, dtype=float).ravel() for v in function(w, self.parameters))
+        grad, *jacobians = (pattern.with_numbers(v) for pattern, v in zip(patterns, numbers))
+        return grad.toarray().ravel(), *jacobians
 
     def violations(self, w, at=None):
         """How much each row (m) and each bound (n) is violated at ``w``."""
@@ -342,18 +355,14 @@ class MpccFunctions:
         return rows / self.scale.g, bounds / self.scale.x, sides / self.scale.sides
 
 
-def csr(J):
-    """casadi DM to scipy csr."""
-    colptr, row = np.array(J.sparsity().colind()), np.array(J.sparsity().row())
-    data = np.array(J.nonzeros(), dtype=float)
-    return sparse.csc_matrix((data, row, colptr), shape=J.shape).tocsr()
+class _Pattern:
+    """The entries of a casadi matrix in scipy's order."""
 
+    def __init__(self, sparsity):
+        numbers = np.arange(1.0, sparsity.nnz() + 1)
+        matrix = sparse.csc_matrix((numbers, np.array(sparsity.row()), np.array(sparsity.colind())), shape=sparsity.shape).tocsr()
+        self._order, self._matrix, self.nonzeros = matrix.data.astype(int) - 1, matrix, sparsity.nnz()
 
-def csr_pattern(J):
-    """Ones where casadi's J has entries, as scipy csr."""
-    return csr(ca.DM(J.sparsity(), 1.0))
-
-
-def take(column, positions):
-    """The elements of a casadi column at ``positions``, as a column; for casadi an empty selection of one element is a row."""
-    return column[[int(k) for k in positions]] if len(positions) else ca.SX(0, 1)
+    def with_numbers(self, numbers):
+        """csr with casadi's nonzeros ``numbers``."""
+        return sparse.csr_matrix((numbers[self._order], self._matrix.indices, self._matrix.indptr), shape=self._matrix.shape)

@@ -20,8 +20,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import lsqr
 
-from pyomo_fesd.mpcc.compile.mpcc_functions import csr
-from pyomo_fesd.mpcc.compile.round_off import parameter_terms
+from pyomo_fesd.mpcc.compile.casadi_matrices import csr
 from pyomo_fesd.mpcc.compile.scaling import MILD
 
 #: Variables of a size within these bounds keep their unit.
@@ -185,7 +184,7 @@ def _evidence(c):
     at, q = c.evaluate(points[0]), len(c.side_of)
     values = np.concatenate([at.g, at.G, at.H])
     bounds = [np.concatenate([b, np.zeros(q)]) for b in (c.lbg, c.ubg)]
-    cancelling = parameter_terms(ca.vertcat(c.g, c.G, c.H), c.x, c.p, points[0], c.parameters)
+    cancelling = c.parameter_terms(points[0])
     parts = [_linear(here, there, values, bounds, points[0], cancelling), _quadratic(c, len(values))]
     return _Evidence.of(*(np.concatenate(arrays) for arrays in zip(*parts)))
 
@@ -214,12 +213,14 @@ def _linear(here, there, values, bounds, w, cancelling):
 def _quadratic(c, row):
     """The same of the objective, a row of its own."""
     n, none = len(c.x0), (np.zeros(0, dtype=int),) * 3 + (np.zeros(0),)
-    if not c.has_objective or ca.Function('f', [c.x, c.p], [c.f]).n_instructions() > LONG:
+    objective = ca.Function('f', [c.x, c.p], [c.f]).expand()
+    if not c.has_objective or objective.n_instructions() > LONG:
         return none
-    hessian = ca.hessian(c.f, c.x)[0]
-    if hessian.nnz() and any(ca.which_depends(ca.vertcat(*hessian.nonzeros()), c.x, 1, True)):
+    x, p = objective.sx_in(0), objective.sx_in(1)
+    hessian = ca.hessian(objective(x, p), x)[0]
+    if hessian.nnz() and any(ca.which_depends(ca.vertcat(*hessian.nonzeros()), x, 1, True)):
         return none
-    H = csr(ca.Function('H', [c.x, c.p], [hessian])(c.x0, c.parameters)).tocoo()
+    H = csr(ca.Function('H', [x, p], [hessian])(c.x0, c.parameters)).tocoo()
     linear = c.gradients(np.zeros(n))[0]
     first, second = np.concatenate([H.row, np.arange(n)]), np.concatenate([H.col, np.full(n, n)])
     return np.full(len(first), row), first, second, np.concatenate([H.data, linear])

@@ -11,14 +11,12 @@ Does not apply: to constants of nonlinear rows, which stay in their functions.
 
 from itertools import chain
 
-import casadi as ca
 import numpy as np
 from pyomo.core import value
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.repn import generate_standard_repn
 
 from pyomo_fesd.core import gradient, mutable_parameters
-from pyomo_fesd.mpcc.compile.mpcc_functions import csr
 
 #: Constants below this part of the terms that cancel in them are rounding errors.
 EXACT = 1e-13
@@ -29,7 +27,7 @@ TELLING = 1e-3
 def without_round_off(constraints, lbg: np.ndarray, ubg: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the bounds of rows with 0 in place of round-off, and the sizes of the terms that cancel in small ones, else 0.
 
-    ``constraints`` are the rows' components.
+    ``constraints`` are the rows' components, or have the same methods.
     """
     bounds = np.array([lbg, ubg], dtype=float)
     small, sizes = (bounds != 0) & (np.abs(bounds) < TELLING), np.zeros(bounds.shape[1])
@@ -63,11 +61,3 @@ def _size(expr):
         return 0.0
     size = sum(abs(slope * value(v)) for slope, v in zip(slopes, values))
     return size if np.isfinite(size) else 0.0
-
-
-def parameter_terms(rows, x, p, w, parameters) -> np.ndarray:
-    """Return the size of the terms of parameters in each of the ``rows`` (SX in terms of x and p) at ``w``."""
-    if not p.numel():
-        return np.zeros(rows.numel())
-    J = csr(ca.Function('terms', [x, p], [ca.jacobian(rows, p)])(w, parameters))
-    return np.nan_to_num(abs(J) @ np.abs(parameters), posinf=0.0)

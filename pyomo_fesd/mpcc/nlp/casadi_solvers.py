@@ -19,6 +19,7 @@ from pyomo_fesd.mpcc.nlp.solver import (
     IPOPT_WARM,
     NlpResult,
     NlpSolver,
+    as_sx,
     check_options,
     rows_with_variables,
     violated,
@@ -178,6 +179,7 @@ class CasadiUno(_CasadiNlp):
             return f"casadi {ca.__version__} has none with a C interface ({error})"
 
     def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
+        x, p, f, g, derivatives = as_sx(x, p, f, g, derivatives)
         # with a violated row without variables Uno's QP solver may never return, whatever the limits
         self._varying, self._g = rows_with_variables(g, x), ca.Function('g', [x, p], [ca.densify(g)])
         super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, derivatives, options)

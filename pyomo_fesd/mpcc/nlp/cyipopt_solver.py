@@ -17,6 +17,7 @@ from pyomo_fesd.mpcc.nlp.solver import (
     NlpResult,
     NlpSolver,
     accepted,
+    as_sx,
     bound_multipliers,
     check_options,
     lagrangian_gradient,
@@ -92,6 +93,7 @@ class CyIpopt(NlpSolver):
     """Ipopt of the system.  Our defaults that its version does not know are left out.  See ``NlpSolver``."""
 
     def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
+        x, p, f, g, derivatives = as_sx(x, p, f, g, derivatives)
         d = derivatives or automatic(x, f, g)
         # Ipopt expects the lower triangle
         hessian = d.hessian.T

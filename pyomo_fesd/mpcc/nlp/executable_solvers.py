@@ -27,6 +27,7 @@ from pyomo_fesd.mpcc.nlp.solver import (
     NlpResult,
     NlpSolver,
     accepted,
+    as_sx,
     bound_multipliers,
     check_options,
     lagrangian_gradient,
@@ -63,6 +64,7 @@ class Executable(NlpSolver):
         defaults = {key: value for key, value in (IPOPT | budget).items() if key not in ('print_level', 'sb')}
         self._options = (_accepted(solver, tuple(defaults.items())) if _like_ipopt(solver) else {}) | options
         self._solver, self._deadline, self._limits_itself = solver, deadline or Deadline(), _like_ipopt(solver)
+        x, p, f, g, _ = as_sx(x, p, f, g)
         self._model = sx_to_pyomo(x, p, f, g)
         self._constant = ~rows_with_variables(g, x)
         self._values, self._lagrangian = ca.Function('values', [x, p], [f, g]), lagrangian_gradient(x, p, f, g)

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from pyomo_fesd.core import FesdError
+from pyomo_fesd.mpcc.compile import Derivatives
 
 #: Measured as clearly the best of five settings on MPCCs; Ipopt's default, the monotone strategy, fails on most of them.
 IPOPT = {
@@ -100,7 +101,7 @@ class NlpSolver(ABC):
     Parameters
     ----------
     name : str
-    x, p, f, g : SX
+    x, p, f, g : SX or MX
     budget : dict
         our limits and tolerances in Ipopt's names (``max_iter``, ``tol``, ``mu_init``, ...); a solver ignores those that it does
         not have
@@ -210,13 +211,26 @@ def bound_multipliers(gradient, lbx, ubx):
 def rows_with_variables(g, x):
     """Mask over the rows; some solvers do not accept a row without variables."""
     rows = np.zeros(g.numel(), dtype=bool)
-    rows[ca.jacobian(g, x).sparsity().row()] = True
+    rows[ca.jacobian_sparsity(g, x).row()] = True
     return rows
 
 
 def violated(g, lbg, ubg):
     """Mask over the rows whose values ``g`` violate their bounds."""
     return (g < lbg - ROW_TOLERANCE) | (g > ubg + ROW_TOLERANCE)
+
+
+def as_sx(x, p, f, g, derivatives=None):
+    """Return an NLP with SX in place of MX, for solvers that need single operations."""
+    if isinstance(x, ca.SX):
+        return x, p, f, g, derivatives
+    nlp = ca.Function('nlp', [x, p], [f, g]).expand()
+    x_, p_ = nlp.sx_in()
+    if derivatives is not None:
+        d, lam = derivatives, (ca.SX.sym('lam_f'), ca.SX.sym('lam_g', g.numel()))
+        function = ca.Function('d', [x, p, d.lam_f, d.lam_g], [d.gradient, d.jacobian, d.hessian]).expand()
+        derivatives = Derivatives(*function(x_, p_, *lam), *lam)
+    return x_, p_, *nlp(x_, p_), derivatives
 
 
 def lagrangian_gradient(x, p, f, g):

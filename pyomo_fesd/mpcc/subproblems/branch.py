@@ -47,12 +47,12 @@ class Branch:
 
     def __init__(self, c, sides, make):
         self._c, self._sides = c, sides
-        weight, z = ca.SX.sym('weight'), ca.SX.sym('z', c.derivatives.z.shape[0])
-        rows = take(z, [*sides.chosen, *range(2 * c.G.numel(), z.numel())])
-        nlp = composed(c, weight, Outer(z, ca.SX(0, 1), ca.SX(0), rows))
+        weight, z = ca.SX.sym('weight'), ca.SX.sym('z', c.inner)
+        rows = take(z, [*sides.chosen, *range(2 * c.pairs, z.numel())])
+        nlp = composed(c, Outer(z, ca.SX(0, 1), weight, ca.SX(0), rows, weight))
         self._pattern = csr_pattern(nlp.derivatives.jacobian)
-        self._values = ca.Function('rows', [c.x, c.p], [nlp.g])
-        self._nlp = make('branch', nlp.x, ca.vertcat(weight, c.p), nlp.f, nlp.g, NEAR, nlp.derivatives)
+        self._values = ca.Function('rows', [nlp.x, nlp.p], [nlp.g])
+        self._nlp = make('branch', nlp.x, nlp.p, nlp.f, nlp.g, NEAR, nlp.derivatives)
 
     def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None, settled=ROW_TOLERANCE):
         """Solve the branch ``zero`` from ``w``.
@@ -169,7 +169,7 @@ class Branch:
         """Free the rows whose variables are all fixed; returns False if one of them is violated by more than ``most``."""
         settled = (self._pattern @ (~fixed).astype(float)) == 0
         if settled.any():
-            g = np.asarray(self._values(w, self._c.parameters), dtype=float).ravel()[settled]
+            g = np.asarray(self._values(w, [0.0, *self._c.parameters]), dtype=float).ravel()[settled]
             if np.any(g < lbg[settled] - most) or np.any(g > ubg[settled] + most):
                 return False
             lbg[settled], ubg[settled] = -np.inf, np.inf

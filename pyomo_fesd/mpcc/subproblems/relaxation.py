@@ -90,15 +90,16 @@ class Relaxation:
 
     def __init__(self, c, sides, form, make):
         eps = ca.SX.sym('eps')
-        z, q = ca.SX.sym('z', c.derivatives.z.shape[0]), c.G.numel()
+        q = c.pairs
+        z = ca.SX.sym('z', c.inner)
         terms = form(take(z, range(q)), take(z, range(q, 2 * q)), eps)
         slack = ca.SX(0, 1) if terms.slack is None else terms.slack
         self._c, self._slack = c, slack.numel()
         signs, count = len(sides.chosen), terms.rows.numel()
         self._lbg = np.concatenate([c.lbg, np.zeros(signs), np.full(count, 0.0 if terms.equal else -np.inf)])
         self._ubg = np.concatenate([c.ubg, np.full(signs, np.inf), np.zeros(count)])
-        nlp = composed(c, 1.0, Outer(z, slack, ca.SX(terms.cost), ca.vertcat(take(z, sides.chosen), terms.rows)))
-        self._nlp = make(form.__name__, nlp.x, ca.vertcat(eps, c.p), nlp.f, nlp.g, LEADING, nlp.derivatives)
+        nlp = composed(c, Outer(z, slack, eps, ca.SX(terms.cost), ca.vertcat(take(z, sides.chosen), terms.rows)))
+        self._nlp = make(form.__name__, nlp.x, nlp.p, nlp.f, nlp.g, LEADING, nlp.derivatives)
 
     def solve(self, w, eps, duals=None, max_iter=None):
         """Solve from ``w``, with the multipliers of an earlier result of this form if given."""

@@ -11,27 +11,24 @@ Leaves: an NLP built when it is first needed.
 import casadi as ca
 import numpy as np
 
-from pyomo_fesd.mpcc.compile import take
+from pyomo_fesd.mpcc.compile import Outer, composed, take, with_parts
 
 
 class Restoration:
     """The restoration NLP of one MPCC; parameters as ``Branch``."""
 
     def __init__(self, c, sides, make):
-        self._c = c
-        eps = ca.SX.sym('eps')
-        S = ca.vertcat(c.G, c.H)
-        rows = ca.vertcat(c.g, take(S, sides.chosen), c.G * c.H - eps)
-        self._rows = ca.Function('rows', [c.x, ca.vertcat(eps, c.p)], [rows])
-        lbg = np.concatenate([c.lbg, np.zeros(len(sides.chosen)), np.full(c.G.numel(), -np.inf)])
-        ubg = np.concatenate([c.ubg, np.full(len(sides.chosen), np.inf), np.zeros(c.G.numel())])
-        up, down = np.flatnonzero(np.isfinite(lbg)), np.flatnonzero(np.isfinite(ubg))
-        p, n = ca.SX.sym('p', len(up)), ca.SX.sym('n', len(down))
-        rows[up.tolist()] += p
-        rows[down.tolist()] -= n
-        self._lbg, self._ubg, self._parts = lbg, ubg, len(up) + len(down)
-        self._up, self._down = up, down
-        self._nlp = make('restoration', ca.vertcat(c.x, p, n), ca.vertcat(eps, c.p), ca.sum1(p) + ca.sum1(n), rows)
+        self._c, q, chosen = c, c.pairs, sides.chosen
+        eps, z = ca.SX.sym('eps'), ca.SX.sym('z', c.inner)
+        G, H = take(z, range(q)), take(z, range(q, 2 * q))
+        nlp = composed(c, Outer(z, ca.SX(0, 1), eps, ca.SX(0), ca.vertcat(take(z, chosen), G * H - eps)))
+        self._rows = ca.Function('rows', [nlp.x, nlp.p], [nlp.g])
+        self._lbg = np.concatenate([c.lbg, np.zeros(len(chosen)), np.full(q, -np.inf)])
+        self._ubg = np.concatenate([c.ubg, np.full(len(chosen), np.inf), np.zeros(q)])
+        self._up, self._down = np.flatnonzero(np.isfinite(self._lbg)), np.flatnonzero(np.isfinite(self._ubg))
+        self._parts = len(self._up) + len(self._down)
+        relaxed = with_parts(nlp, self._up, self._down)
+        self._nlp = make('restoration', relaxed.x, relaxed.p, relaxed.f, relaxed.g, None, relaxed.derivatives)
 
     def solve(self, w, eps):
         """Solve from ``w``; ``f`` of the result is the remaining sum of violations."""

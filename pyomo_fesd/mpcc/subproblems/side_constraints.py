@@ -8,7 +8,6 @@ equations ("a sum of non-negative variables is 0"), and Ipopt gets no superfluou
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import casadi as ca
 import numpy as np
 from scipy import sparse
 
@@ -76,17 +75,15 @@ class Sides:
 
 def sort_sides(c) -> Sides:
     """Sort the sides of a compiled MPCC."""
-    S = ca.vertcat(c.G, c.H)
-    if S.numel() == 0:
+    if not c.pairs:
         return Sides(np.zeros(0, dtype=int), np.zeros(0, dtype=int), sparse.csr_matrix((0, len(c.x0))))
-    nonlinear = np.array(ca.which_depends(S, c.x, 2, True))
     _, _, J_G, J_H, _ = c.gradients(c.x0)
     at = c.evaluate(c.x0)
     A = sparse.vstack([J_G, J_H]).tocsr()
     constant = np.concatenate([at.G, at.H]) - A @ c.x0
     direction, least = _least(A, c.lbx, c.ubx)
-    fixable = ~nonlinear & (np.abs(least + constant) <= EXACT)
-    row_of = np.full(S.numel(), -1)
+    fixable = ~c.nonlinear_sides & (np.abs(least + constant) <= EXACT)
+    row_of = np.full(2 * c.pairs, -1)
     needed = np.flatnonzero(~fixable)
     _, first, row = np.unique(c.side_of[needed], return_index=True, return_inverse=True)
     row_of[needed] = row

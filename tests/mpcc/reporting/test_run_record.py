@@ -41,7 +41,7 @@ def test_the_record_holds_what_a_bug_report_needs(tmp_path):
     assert record['results']['stationarity'] == 'B'
     assert record['results']['violation'] == results.extra_info.violation
     assert record['objective'] == pytest.approx(17)
-    assert record['seconds']['compile']['of which']['write']['calls'] == 1
+    assert record['seconds']['compile']['of which']['read']['calls'] == 1
     assert len(record['steps']) == len(results.extra_info.steps) and 'w' not in record['steps'][0]
     assert record['error'] is None
 
