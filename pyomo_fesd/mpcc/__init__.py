@@ -10,7 +10,7 @@ record), ``multistart``.  The plug-ins of ``pyomo_fesd.solvers`` put them togeth
     fill_results(results, model, run, loaded, compiled)
 """
 
-from pyomo_fesd.mpcc.algorithm import HybridSolver, Outcome, Run, Setup, Tolerances
+from pyomo_fesd.mpcc.algorithm import HybridSolver, Outcome, Run, Setup, Tolerances, is_exact
 from pyomo_fesd.mpcc.compile import (
     NATURAL_UNITS,
     Contradiction,

@@ -6,6 +6,7 @@ with ``gap_test`` (when it may end) and ``recovery`` (when a relaxation fails), 
 resort), ``subsolves`` (limits, times and log of each NLP and LPEC), ``start_points``.
 """
 
+from pyomo_fesd.mpcc.algorithm.feasible_start import is_exact
 from pyomo_fesd.mpcc.algorithm.hybrid import HybridSolver
 from pyomo_fesd.mpcc.algorithm.start_points import start_point
 from pyomo_fesd.mpcc.algorithm.state import Counts, LogEntry, Outcome, Run, Setup, Start, Stop, Tolerances

@@ -33,12 +33,12 @@ def feasible_start(c, subsolves, w) -> tuple[Point | None, str]:
     if not found.feasible:
         return None, f"not feasible: {_most_violated(c, w)}"
     at, tolerances = c.evaluate(w), subsolves.tolerances
-    equal, is_exact = at.eta > tolerances.eta, _is_exact(c, w, at)
+    equal, exact = at.eta > tolerances.eta, is_exact(c, w)
     nlp = unchanged = NlpResult(w, at.f, 'start', 0, np.zeros(len(c.lbg)), np.zeros(len(w)))
-    if not is_exact or np.any(np.abs(c.decided(w))[equal] > EXACT):
+    if not exact or np.any(np.abs(c.decided(w))[equal] > EXACT):
         zero = active_sets(at.G, at.H, tolerances.biactive).zero
         nlp = subsolves.branch(w, zero, equal, 0.0, settled=tolerances.feasibility)
-    if nlp is None and (is_exact or _is_complementary(c, w, at, c.gradients(w))):
+    if nlp is None and (exact or _is_complementary(c, w, at, c.gradients(w))):
         # the decisions only choose among solutions, and none of these satisfies them; or Ipopt does not reach its own tolerance
         # in rows of large terms, and the start is as feasible as any answer has to be
         nlp, equal = unchanged, np.zeros_like(equal)
@@ -48,9 +48,9 @@ def feasible_start(c, subsolves, w) -> tuple[Point | None, str]:
     return (Point(nlp, at.f, certificate, equal), '') if certificate.certified else (None, certificate.grade.value)
 
 
-def _is_exact(c, w, at):
-    """Whether rows, bounds and pairs hold as far as round-off lets them."""
-    gradients = c.gradients(w)
+def is_exact(c, w) -> bool:
+    """Return whether rows, bounds and pairs hold at ``w`` as far as round-off lets them."""
+    at, gradients = c.evaluate(w), c.gradients(w)
     rows, bounds = c.violations(w, at)
     held = bounds.max(initial=0.0) <= EXACT and np.all(rows <= _reachable(gradients[1], w))
     return bool(held) and _is_complementary(c, w, at, gradients)
