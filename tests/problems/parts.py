@@ -25,8 +25,9 @@ def compiled(model, parameters=()):
 
 @dataclass
 class Parts:
-    """One run's parts; see their classes."""
+    """One run's parts; see their classes.  The model is kept, as variables only refer to it weakly."""
 
+    model: object
     compiled: MpccFunctions
     run: Run
     subsolves: Subsolves
@@ -51,4 +52,4 @@ def parts(model, **options):
     setup = Setup(c, config, HierarchicalTimer(), Deadline(), cache, show=lambda entry: None, after=lambda run: None)
     subsolves = Subsolves(setup, Tolerances.of(config), run)
     gap = GapTest(config.gap_tol * 1e-2, config.gap_tol)
-    return Parts(c, run, subsolves, gap, Branches(subsolves, gap, GLOBAL_LPEC_SEARCH[config.lpec](c)))
+    return Parts(model, c, run, subsolves, gap, Branches(subsolves, gap, GLOBAL_LPEC_SEARCH[config.lpec](c)))
