@@ -169,7 +169,15 @@ def test_iteration_limit_is_reported():
     assert results.solver.termination_condition == pyo.TerminationCondition.maxIterations
 
 
-def test_ctrl_c_during_an_nlp_ends_with_a_result(monkeypatch):
+@pytest.fixture
+def attentive():
+    """Ctrl-C has Python's handler, also where the tests run in the background of a shell, which lets its jobs ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_during_an_nlp_ends_with_a_result(monkeypatch, attentive):
     m = big_oscillator()
     names, iterations, ask = set(m.component_map()), itertools.count(), casadi_solvers._StopCallback.eval_buffer
 
