@@ -130,6 +130,8 @@ class Completions:
         best = self.run.point
         self._c.widen()
         if best.equal is None:
+            # no NLP's solution: it is judged as it is, and its branch may have a better one
+            self.run.point = replace(best, certificate=self._subsolves.judge(best.w))
             self._branches.explore_from(best.w, True)
         else:
             self.run.point = replace(best, certificate=self._subsolves.certify(best.nlp, best.equal))

@@ -87,3 +87,11 @@ def test_a_second_path_is_no_help_where_nothing_can_be_completed():
     p.subsolves.attempt = lambda *args, **more: None
     rounds.follow(p.compiled.x0)
     assert p.run.point is None and len(asked) == 4
+
+
+def test_a_completion_without_a_branch_is_judged_as_it_is():
+    p, rounds, _ = completions(lambda x: (0.5, True))
+    p.subsolves.attempt = lambda *args, **more: None
+    rounds.follow(p.compiled.x0)
+    assert p.run.point.f == pytest.approx(0.75)
+    assert p.run.point.certificate.grade is Stationarity.DESCENT
