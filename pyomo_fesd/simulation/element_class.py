@@ -109,12 +109,12 @@ class ElementClass:
         end = ElementEnd(dict(zip(names, step.active.tolist())), event, step.end, self, step.activity)
         return float(step.length) * self.nominal, end
 
-    def mpcc_step(self, equations: ElementEquations, most: float, options: dict):
-        """Solve the MPCC; returns the ``extra_info`` of its results, and the length."""
+    def mpcc_step(self, equations: ElementEquations, most: float, options: dict, least: float = 0.0):
+        """Solve the MPCC with a length between ``least`` and ``most``; returns the ``extra_info`` of its results, and the length."""
         if self._values is not None:
             self.mpcc.set_start(self._values)
         with phase(self._timer, 'mpcc'):
-            answer = self.mpcc.solve(equations, most / self.nominal, **options)
+            answer = self.mpcc.solve(equations, most / self.nominal, least / self.nominal, **options)
         return answer, self.mpcc.length * self.nominal
 
     def accept_mpcc(self, equations: ElementEquations, most: float, h: float) -> tuple[float, ElementEnd]:

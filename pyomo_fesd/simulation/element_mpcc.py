@@ -28,7 +28,6 @@ class ElementMpcc:
         self.model, self._length = copy.model, copy.length
         copy.add_pairs('cross', pattern.cross_pairs)
         if self._length is not None:
-            self._length.setlb(0)
             self.model.step = pyo.Objective(expr=self._length, sense=pyo.maximize)
         self._solver = SolverFactory('mpec_hybrid', **(OPTIONS | options))
         self._solver.set_instance(self.model, parameters=[self.model.known])
@@ -38,24 +37,20 @@ class ElementMpcc:
         for v, number in zip(self.model.unknown.values(), values):
             v.set_value(number, skip_validation=True)
 
-    def solve(self, equations: ElementEquations, most: float | None = None, **options):
-        """Solve for other ``equations`` of the class, with a length multiplier up to ``most``; returns the ``extra_info``."""
+    def solve(self, equations: ElementEquations, most: float | None = None, least: float = 0.0, **options):
+        """Solve for other ``equations`` of the class; returns the ``extra_info``.
+
+        The length multiplier is between ``least`` and ``most``; where both are equal, the answer shows which equations prevent it.
+        """
         self._copy.set_known(equations)
         if self._length is not None:
+            self._length.setlb(least)
             self._length.setub(most)
             self._length.set_value(most)
         results = self._solver.solve(self.model, time_limit=self._deadline.left(), **options)
         if results.termination_condition is TerminationCondition.interrupted:
             raise KeyboardInterrupt
         return results.extra_info
-
-    def solve_with_length(self, equations: ElementEquations, length: float):
-        """Solve with a given length multiplier, to see which equations prevent it; returns as ``solve``."""
-        self._length.setlb(length)
-        try:
-            return self.solve(equations, length)
-        finally:
-            self._length.setlb(0)
 
     @property
     def length(self) -> float:

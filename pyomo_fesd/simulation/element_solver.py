@@ -20,14 +20,16 @@ from pyomo_fesd.simulation.step_sizes import SimulatedElement
 NO_STEP, CUT = 1e-9, 1e-7
 #: A given state jumps if it changes by more than the first part of its value, and so many times faster than to the element's end.
 JUMP, STEEP = 1e-6, 2.0
-#: Options of the MPCC, tried in this order: a warm start from the last element; searches farther away; other starts.  A step of
-#: length zero is a local solution of its own where a switch lies on the left boundary, so the later ones search farther.
+#: Options of the MPCC, tried in this order: a warm start from the last element; searches farther away; other starts.
 TRIES = (
     {'warm_start': True, 'lpec': 'reduced'},
     {'lpec': 'full', 'relaxation': 'elastic'},
     {'lpec': 'full'},
     {'lpec': 'full', 'starts': 6},
 )
+#: A step of length zero is a local solution of its own where a switch lies on the left boundary.  Then lengths of at least these parts
+#: of the aim are asked for; a step is longer by the last part, else the bound holds it.
+LEAST, BEYOND, LONGER = (1e-2, 1e-4), {'lpec': 'full', 'relaxation': 'elastic'}, 1e-3
 
 
 class ElementSolver:
@@ -87,9 +89,10 @@ class ElementSolver:
         self._end = replace(self._end, values=None)
 
     def end_pass(self) -> None:
-        """Set the multipliers of the hysteresis conditions."""
+        """Set the multipliers of the hysteresis conditions, and the variables of requirements."""
         for modes in self._hysteresis:
             modes.set_multipliers(self._grid, self._first)
+        self._reader.requirements.fulfil()
 
     def solve(self, element, aim: float, warm: bool) -> SimulatedElement:
         """Solve the next element, up to the length ``aim`` or the first event; ``warm`` as in ``TRIES``."""
@@ -189,18 +192,34 @@ class ElementSolver:
             found = None
         return v.value if found is None else found
 
-    def _mpcc_step(self, element_class, equations, most, tries, least, element):
-        """A step longer than ``least`` where the next active set is unknown, or does not hold."""
+    def _mpcc_step(self, element_class, equations, most, tries, no_step, element):
+        """A step longer than ``no_step`` where the next active set is unknown, or does not hold."""
+        is_stuck = False
         for options in tries:
-            answer, h = element_class.mpcc_step(equations, most, options)
-            self._progress.check_time()
-            if answer.stationarity == 'B' and h > least:
-                return element_class.accept_mpcc(equations, most, h)
+            answer, h = self._longest(element_class, equations, most, options)
+            if answer.stationarity == 'B':
+                if h <= no_step and not is_stuck:
+                    is_stuck, h = True, self._length_beyond(element_class, equations, most)
+                if h > no_step:
+                    return element_class.accept_mpcc(equations, most, h)
         raise self._no_step(element_class, equations, most, answer, element)
+
+    def _length_beyond(self, element_class, equations, most):
+        """The length of a step that is not zero; 0 if none is found."""
+        for part in LEAST:
+            answer, h = self._longest(element_class, equations, most, BEYOND, part * most)
+            if answer.stationarity == 'B' and h > part * most * (1 + LONGER):
+                return h
+        return 0.0
+
+    def _longest(self, element_class, equations, most, options, least=0.0):
+        found = element_class.mpcc_step(equations, most, options, least)
+        self._progress.check_time()
+        return found
 
     def _no_step(self, element_class, equations, most, answer, element):
         mpcc, now = element_class.mpcc, f"{self._progress.time:.6g}"
-        mpcc.solve_with_length(equations, most / element_class.nominal)
+        mpcc.solve(equations, most / element_class.nominal, most / element_class.nominal)
         residuals = largest_residuals(self._model, self._times, equations, mpcc.values)
         forced = f"; where one is forced, {residuals}" if residuals else ''
         jump = self._jump_of_given_state(element)

@@ -1,6 +1,6 @@
 """Read the equations of one element of a moving grid from the model: equations, signs, pairs, unknowns.
 
-Does not apply: to inequalities of the user, which do not determine a simulation.
+Does not apply: to inequalities of the user and conditions like them (``requirements``), which do not determine a simulation.
 """
 
 from collections import defaultdict
@@ -17,6 +17,7 @@ from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core import MovingGrid, TimeIndex, derivatives, is_discretisation_equation, is_generated, read_complementarity
 from pyomo_fesd.simulation.element_equations import ElementEquations, PointPairs
+from pyomo_fesd.simulation.requirements import Requirements
 from pyomo_fesd.simulation.structural_key import StructuralKey, variables_of
 
 #: A side below this part of the other is zero.
@@ -24,7 +25,13 @@ STRICT = 1e-5
 
 
 class EquationReader:
-    """Reads the equations of a moving grid; variables over time in ``given`` are known."""
+    """Reads the equations of a moving grid; variables over time in ``given`` are known.
+
+    Attributes
+    ----------
+    requirements : Requirements
+        conditions that are left out, with variables that are known
+    """
 
     def __init__(self, model: Block, moving: MovingGrid, times: TimeIndex, given: Container[VarData]):
         self._model, self._moving, self._times, self._given = model, moving, times, given
@@ -34,6 +41,7 @@ class EquationReader:
         self._read_rows()
         self._read_copies()
         self._read_grid_rows()
+        self.requirements = self._read_requirements()
         self._conditions, self._pairs = defaultdict(list), defaultdict(list)
         self._read_conditions()
 
@@ -78,20 +86,32 @@ class EquationReader:
         for c in _data(self._moving.sign_after):
             self._rows_of[c.index()[1]].append(c)
 
+    def _read_requirements(self):
+        found = Requirements(self._moving.complementarities, self._rows_at.__getitem__, self._times, self._given)
+        self._given = ComponentSet(chain(self._given, found.variables))
+        for t, rows in self._rows_at.items() if found.equations else ():
+            self._rows_at[t] = [c for c in rows if id(c) not in found.equations]
+        found.prepare()
+        return found
+
     def _read_conditions(self):
-        """Conditions by label, aggregated pairs by element."""
+        """Conditions by label, aggregated pairs by element, and the conditions over time, without requirements."""
+        names = self.requirements.names
+        self._over_time = [c for c in self._moving.complementarities if c.name not in names]
         for index, c in self._moving.pairs.items():
-            self._pairs[index[1]].append(c)
+            if index[0] not in names:
+                self._pairs[index[1]].append(c)
+        left_out = {id(c) for f in self._moving.complementarities if f.name in names for c in f.conditions.values()}
         for c in self._model.component_data_objects(Complementarity, descend_into=Block):
             label = self._times.time(c)
-            if label is not None and getattr(c, '_args', None) is not None:
+            if label is not None and getattr(c, '_args', None) is not None and id(c) not in left_out:
                 self._conditions[label].append(c)
 
     def first(self, label: float) -> ElementEquations:
         """Return the algebraic equations of the first time; conditions hold there as they are."""
         conditions = [c for c in self._conditions[label] if c.active]
         pairs = [read_complementarity(c) for c in conditions]
-        over_time = [f for f in self._moving.complementarities if label in f.sides]
+        over_time = [f for f in self._over_time if label in f.sides]
         points = {f.name: PointPairs([f.sides[label]], 1, f.continuous) for f in over_time}
         return self._equations(self._rows_at[label], {}, pairs, points, conditions, (label,))
 
@@ -101,7 +121,7 @@ class EquationReader:
         rows = [*(c for t in labels for c in self._rows_at[t]), *self._rows_of[n]]
         pairs = [read_complementarity(c) for c in self._pairs[n]]
         conditions = [c for t in labels for c in self._conditions[t]]
-        points = {f.name: PointPairs.read(f, element) for f in self._moving.complementarities}
+        points = {f.name: PointPairs.read(f, element) for f in self._over_time}
         chosen = [self._moving.r[n], *self._copies_of[n]]
         return self._equations(rows, event_functions, pairs, points, conditions, labels, chosen)
 
@@ -167,7 +187,7 @@ class EquationReader:
     def active_set(self, label: float) -> dict[str, bool] | None:
         """Return for each condition at one label whether its H (else its G) is zero; None if both sides of one are zero."""
         found = {}
-        for condition in self._moving.complementarities:
+        for condition in self._over_time:
             if label in condition.sides:
                 G, H = map(abs, map(value, condition.sides[label]))
                 if min(G, H) > STRICT * max(G, H) or max(G, H) < STRICT:

@@ -113,10 +113,14 @@ def _slip(m, t):
 
 
 def _no_slip(m, force):
-    """0 <= force perp w >= |slip|."""
-    m.w = pyo.Var(m.t, initialize=0, bounds=(0, None))
-    m.size = pyo.Constraint([-1, 1], m.t, rule=lambda m, side, t: side * _slip(m, t) <= m.w[t])
-    m.no_slip = Complementarity(m.t, rule=lambda m, t: complements(force(m, t) >= 0, m.w[t] >= 0))
+    """0 <= force perp |slip|: slip = forth - back, each of which is zero where the force is not.
+
+    (One variable that two inequalities keep above |slip| states the same, but where it is zero these have no interior.)
+    """
+    m.forth, m.back = pyo.Var(m.t, initialize=0, bounds=(0, None)), pyo.Var(m.t, initialize=0, bounds=(0, None))
+    m.parts = pyo.Constraint(m.t, rule=lambda m, t: _slip(m, t) == m.forth[t] - m.back[t])
+    m.no_slip_forth = Complementarity(m.t, rule=lambda m, t: complements(force(m, t) >= 0, m.forth[t] >= 0))
+    m.no_slip_back = Complementarity(m.t, rule=lambda m, t: complements(force(m, t) >= 0, m.back[t] >= 0))
 
 
 def _with_contact(elements=ELEMENTS, ncp=NCP, no_slip=True, guess='start', **options):
@@ -125,7 +129,7 @@ def _with_contact(elements=ELEMENTS, ncp=NCP, no_slip=True, guess='start', **opt
     m.ground = pyomo_fesd.contact(m.t, gap=lambda m, t: gap(_at(m, t)[0], pyo), friction=FRICTION, slip=_slip)
     if no_slip:
         _no_slip(m, lambda m, t: m.ground[t].normal)
-        options['continuous'] = [m.w]
+        options['continuous'] = [m.forth, m.back]
     m.way = pyo.Constraint(m.i, m.t, rule=lambda m, i, t: m.dq[i, t] == m.v[i, t])
 
     @m.Constraint(m.i, m.t)
@@ -175,7 +179,7 @@ def _with_frozen_time(elements=ELEMENTS, ncp=NCP, clock='speed', guess='start', 
     m.track = dae.Integral(m.t, rule=lambda m, t: m.runs[t] * running(*_at(m, t), [m.wanted[i, t] for i in m.i]))
     m.cost = pyo.Objective(expr=m.track + final_cost(*_at(m, HORIZON)[:2]))
     pyo.TransformationFactory('fesd.dcs').apply_to(m, form='heaviside')
-    return grid.moving_grid(m, elements, [m.u, m.wanted], continuous=[m.w], ncp=ncp, **clocked, **options)
+    return grid.moving_grid(m, elements, [m.u, m.wanted], continuous=[m.forth, m.back], ncp=ncp, **clocked, **options)
 
 
 #: The forms of the model.
