@@ -52,7 +52,7 @@ class Requirements:
         given: Container[VarData],
     ):
         conditions = [c for c in conditions if c.sides]
-        candidates = [(c, k) for c in conditions for k in range(2) if _is_free(_last(c)[k], times, given)]
+        candidates = [(c, k) for c in conditions for k in range(2) if _may_be_free(_last(c), k, times, given)]
         free = _AtLastTime(candidates, conditions, rows_at, times, given).free() if candidates else []
         self.names = {c.name for c, _ in free}
         self._sides = [(sides[k], sides[1 - k]) for c, k in free for sides in c.sides.values()]
@@ -119,8 +119,11 @@ class _AtLastTime:
         return structural_rank(csr_matrix((np.ones(len(entries)), at), shape=(len(left), len(columns)))) == len(columns)
 
 
-def _is_free(side, times, given):
-    return isinstance(side, VarData) and not side.fixed and times.time(side) is not None and side not in given
+def _may_be_free(sides, k, times, given):
+    side, other = sides[k], sides[1 - k]
+    if not isinstance(side, VarData) or side.fixed or times.time(side) is None or side in given:
+        return False
+    return other is not side and side not in variables_of([other])
 
 
 def _last(condition):

@@ -24,7 +24,9 @@ def drained(wall=False):
     m.tank.balance = pyo.Constraint(m.t, rule=lambda b, t: b.rate[t] == -1e6)
     m.tank.outlet = pyo.Constraint(m.t, rule=lambda b, t: b.flow[t] ** 2 == b.level[t])
     if wall:
-        m.tank.lam = pyo.Var(m.t, bounds=(0, None))
+        # nothing would determine a reaction that no equation contains, and the wall would be left out
+        m.tank.lam, m.tank.strain = pyo.Var(m.t, bounds=(0, None)), pyo.Var(m.t, initialize=0)
+        m.tank.elastic = pyo.Constraint(m.t, rule=lambda b, t: b.strain[t] + 1e6 == 1e6 + 1e-9 * b.lam[t])
         m.tank.wall = Complementarity(m.t, rule=lambda b, t: complements(b.level[t] >= 0, b.lam[t] >= 0))
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=4, ncp=2)
     return m
