@@ -19,6 +19,9 @@ SUGGESTION = {'mip_max_nodes': 100, 'mip_max_improving_sols': 1, 'presolve': 'of
 SHARE, LEAST_TIME = 0.2, 0.2
 #: Statuses of a problem that an NLP solver found infeasible: the model's own rows may hold there, the pairs do not.
 INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
+#: Status where Ipopt cannot make the violation smaller, and the violation from which on its point is none: a multiplier may be so
+#: large that the objective owes all to what is left, as with a force of 1e7 at a gap of 1e-8.
+STUCK, LEFT = 'Restoration_Failed', 1e-8
 #: Iterations that an NLP may use; a relaxation without multipliers to start from may use more.
 COLD = 4
 ITERATIONS = {
@@ -112,7 +115,8 @@ class Subsolves:
 
     def usable(self, result):
         """Whether an NLP's point can be used: solved, or stopped where the model's constraints hold, but not as infeasible."""
-        return result.solved or (result.status not in INFEASIBLE and self.violation(result.w) <= self.tolerances.feasibility)
+        most = min(LEFT, self.tolerances.feasibility) if result.status == STUCK else self.tolerances.feasibility
+        return result.solved or (result.status not in INFEASIBLE and self.violation(result.w) <= most)
 
     def violation(self, w):
         """The largest violation of rows and bounds."""
