@@ -1,13 +1,13 @@
 """Concepts that all rooms share: errors, time in an index, grids, complementarity, expression keys, and the three records.
 
-Read first ``errors``, ``time_index``, ``grid`` and ``complementarity``, then the records: ``switched_systems`` (which
-components switch; written before discretisation), ``moving_grid`` with ``boundary_laws`` and ``instants`` (elements of variable
-length; written by ``fesd.finite_elements``) and ``homotopy_hints`` (for the solver; no time in it).  ``private_data`` keeps them
-on blocks, ``generated`` recognises generated blocks, ``keywords`` refuses values outside of their domains, ``renamed`` words of
-earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait where something would be,
-``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
+Read first ``errors``, ``time_index``, ``grid`` and ``complementarity``, then the records: ``switched_systems`` (which components
+switch; written before discretisation), ``moving_grid`` with ``boundary_laws`` and ``instants`` (elements of variable length;
+written by ``fesd.finite_elements``; ``held_controls`` reads from it) and ``homotopy_hints`` (for the solver; no time in it).
+``private_data`` keeps them on blocks, ``generated`` recognises generated blocks, ``keywords`` refuses values outside of their
+domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
+where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
 ``evaluation``, ``gradient``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``expression_key`` and ``phase`` are
-tools.  This room imports from no other.
+tools. This room imports from no other.
 """
 
 from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
@@ -33,6 +33,7 @@ from pyomo_fesd.core.grid import (
     read_grid,
     share_elements,
 )
+from pyomo_fesd.core.held_controls import held_controls
 from pyomo_fesd.core.homotopy_hints import (
     Arrival,
     BranchConstraint,

@@ -110,7 +110,7 @@ class ElementClass:
         return float(step.length) * self.nominal, end
 
     def mpcc_step(self, equations: ElementEquations, most: float, options: dict, least: float = 0.0):
-        """Solve the MPCC with a length between ``least`` and ``most``; returns the ``extra_info`` of its results, and the length."""
+        """Solve the MPCC with a length from ``least`` to ``most``; returns the ``extra_info`` of its results, and the length."""
         if self._values is not None:
             self.mpcc.set_start(self._values)
         with phase(self._timer, 'mpcc'):

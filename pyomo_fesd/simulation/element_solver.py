@@ -27,8 +27,8 @@ TRIES = (
     {'lpec': 'full'},
     {'lpec': 'full', 'starts': 6},
 )
-#: A step of length zero is a local solution of its own where a switch lies on the left boundary.  Then lengths of at least these parts
-#: of the aim are asked for; a step is longer by the last part, else the bound holds it.
+#: A step of length zero is a local solution of its own where a switch lies on the left boundary.  Then lengths of at least these
+#: parts of the aim are asked for; a step is longer by the last part, else the bound holds it.
 LEAST, BEYOND, LONGER = (1e-2, 1e-4), {'lpec': 'full', 'relaxation': 'elastic'}, 1e-3
 
 

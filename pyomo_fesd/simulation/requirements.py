@@ -103,7 +103,7 @@ class _AtLastTime:
         shared = {row: inside & alone.keys() for row, inside in self._equations.items() if inside & alone.keys()}
         without_equation = alone.keys() - set().union(*shared.values())
         groups = [({v}, set()) for v in without_equation]
-        groups += [(inside, {row}) for row, inside in shared.items() if len(inside) > 1 and _against_one([alone[v] for v in inside])]
+        groups += [(inside, {row}) for row, inside in shared.items() if _are_free_at_once([alone[v] for v in inside])]
         return [alone[v] for inside, rows in groups if self._rest_is_determined(inside, rows, alone) for v in inside]
 
     def _rest_is_determined(self, inside, rows, alone):
@@ -131,10 +131,10 @@ def _last(condition):
     return condition.sides[max(condition.sides)]
 
 
-def _against_one(candidates):
-    """Whether all have the same other side, so that all variables are free at once; those of a law of friction are not."""
+def _are_free_at_once(candidates):
+    """Whether there are several, all with the same other side; a law of friction has not."""
     first, *others = (_last(c)[1 - k] for c, k in candidates)
-    return all(compare_expressions(first, other) for other in others)
+    return bool(others) and all(compare_expressions(first, other) for other in others)
 
 
 def _fulfil(row, inside):

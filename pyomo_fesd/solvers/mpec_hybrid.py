@@ -125,7 +125,7 @@ class MpecHybrid(CasadiSolver):
                     table.begin(compiled)
                     shared = compiled, config, config.timer, ready.deadline, ready.cache
                     followed = table.row, reporter(config.callback, compiled, started)
-                    setup = Setup(*shared, *followed, start.further(compiled), start.completion(compiled))
+                    setup = Setup(*shared, *followed, start.further(compiled), start.completion(compiled), start.draw(compiled))
                     solver = (Multistart if config.starts > 1 else HybridSolver)(setup)
                     record.run = solver.run
                     fill_results(results, model, solver.solve(), set_indicators, compiled, names=user_names)

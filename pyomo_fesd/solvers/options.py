@@ -112,6 +112,13 @@ OPTIONS = (
     ('branch_iterations', 300, PositiveInt, "Ipopt iterations allowed to one branch NLP; a wrong branch uses all of them"),
     ('max_iterations', 20000, PositiveInt, "Ipopt iterations allowed in all; with several starts, to each"),
     ('starts', 1, PositiveInt, "number of points to solve from, the first being the model's values; the best solution is kept"),
+    (
+        'starts_vary',
+        'variables',
+        In(['variables', 'controls']),
+        "what is random in further starts: 'variables' (all of them), or 'controls' (those held on control stages, with which the "
+        "plant is simulated; all other variables have the simulated values)",
+    ),
     ('seed', 0, NonNegativeInt, "of the random points: the same seed gives the same points"),
     (
         'executor',

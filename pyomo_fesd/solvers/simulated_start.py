@@ -16,6 +16,7 @@ from pyomo.gdp import Disjunct
 
 from pyomo_fesd.core import FesdError, moving_grids, withheld_messages
 from pyomo_fesd.mpcc import Deadline
+from pyomo_fesd.solvers.drawn_controls import draw_controls, refuse_without_controls
 
 #: Part of the time limit that a simulation may take.
 SHARE = 0.5
@@ -87,6 +88,40 @@ class SimulatedStart:
         if not applies or len(grids) != 1 or grids[0].state_jumps is None:
             return None
         return lambda w, seconds: self._completed(compiled, w, seconds)
+
+    def draw(self, compiled) -> Callable | None:
+        """Return a function that draws the controls of a start and simulates with them; None unless ``starts_vary`` asks for that.
+
+        It takes the number of the start, and returns an array in the units of ``compiled`` (MpccFunctions): where the simulation
+        fails, the values of the model after this time.  The model is left as it was.
+
+        Raises
+        ------
+        FesdError
+            for a model without one moving grid, or without controls
+        """
+        if self._options.starts == 1 or self._options.starts_vary != 'controls':
+            return None
+        grids = list(moving_grids(self._model).values())
+        if len(grids) != 1:
+            raise FesdError(
+                self._model,
+                f"starts_vary='controls': the model has {len(grids)} moving grids",
+                "apply fesd.finite_elements to one ContinuousSet, or let starts_vary be 'variables'",
+            )
+        refuse_without_controls(grids[0])
+        return lambda number: self._drawn(compiled, grids[0], number)
+
+    def _drawn(self, compiled, moving, number):
+        left, before = self._deadline.left(), self.note
+        self._remember()
+        try:
+            draw_controls(moving, self._options.seed, number)
+            self._simulate("drawn controls simulated", True, None if left is None else left / self._options.starts)
+            return compiled.present_values()
+        finally:
+            self.note = before
+            self.restore()
 
     def _completed(self, compiled, w, seconds):
         before = self.note

@@ -51,6 +51,8 @@ class Setup:
     complete : callable or None
         takes a point (array) and the seconds that it may take; returns a point with the same values of the free variables, at which
         all other variables solve equations and pairs, whether that was possible for all of them, and a note for the log
+    draw : callable or None
+        takes the number of a start, from 1; returns a random point (array), instead of ``start_point``
     """
 
     compiled: object
@@ -62,6 +64,7 @@ class Setup:
     after: Callable
     further_start: Optional[Callable] = None
     complete: Optional[Callable] = None
+    draw: Optional[Callable] = None
 
 
 @dataclass(frozen=True)

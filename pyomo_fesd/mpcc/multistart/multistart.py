@@ -3,12 +3,13 @@
 Takes: the ``Setup`` of a run with the options ``starts``, ``seed`` and ``executor``.
 Leaves: one ``Run``: that of the best start, with the work of all and a record of each.
 
-A start is a function of the seed and its number (``start_points``), and a run one of its start, so neither the executor nor the
-order has an influence on the answer; only a limit makes it depend on speed.
+A start is a function of the seed and its number (``start_points``, or ``draw`` of the Setup), and a run one of its start, so
+neither the executor nor the order has an influence on the answer; only a limit makes it depend on speed.
 """
 
 from concurrent.futures import TimeoutError as FuturesTimeout
 from concurrent.futures import as_completed
+from functools import partial
 
 from pyomo_fesd.core import FesdError, interrupt_handled
 from pyomo_fesd.mpcc.algorithm import Outcome, Run, Setup, Start, start_point
@@ -55,7 +56,8 @@ class Multistart:
             if every start failed, or for a mistake in the options that a worker finds
         """
         c, options, x0 = self._setup.compiled, self._setup.options, self._setup.compiled.x0
-        points = (start_point(c, x0, options.seed, number) for number in range(options.starts))
+        draw = self._setup.draw or partial(start_point, c, x0, options.seed)
+        points = (draw(number) if number else x0 for number in range(options.starts))
         solved = _here(self._job, points) if options.executor is None else _elsewhere(self._job, options.executor, points)
         ended, interrupted = [], False
         try:
