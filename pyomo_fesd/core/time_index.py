@@ -86,7 +86,7 @@ class TimeIndex:
 
     def __init__(self, wrt):
         self.wrt = wrt
-        self._places = {}
+        self._places, self._names = {}, {}
 
     def _place(self, component):
         place = self._places.get(id(component))
@@ -113,7 +113,11 @@ class TimeIndex:
         index = index_tuple(data.index())
         if position is not None:
             time, index = index[position] if time is None else time, _replaced(index, position, '*')
-        return time, f'{name}[{",".join(map(str, index))}]'
+        # a name is the same at all times, and takes longer to write than to find
+        full = self._names.get((id(component), index))
+        if full is None:
+            full = self._names[id(component), index] = f'{name}[{",".join(map(str, index))}]'
+        return time, full
 
     def time(self, data):
         """Time label of ``data``, or None."""

@@ -13,8 +13,9 @@ from scipy.sparse.linalg import splu
 
 from pyomo_fesd.simulation.element_residuals import ElementResiduals
 
-#: Up to this number of unknowns a dense factorisation is faster.
-DENSE = 150
+#: Up to these numbers of unknowns a dense method is faster, for square systems and for least squares.  Above them OpenBLAS uses
+#: threads, which wait for one another where the machine is busy: 30 to 200 ms for a step instead of one.
+DENSE, DENSE_LEAST_SQUARES = 120, 60
 #: Largest residuals of a solution: relative to the terms of their sum, and in the solver's scale.
 EXACT, TINY = 1e-12, 1e-14
 #: Iterations of a method that converges quadratically.
@@ -57,7 +58,8 @@ class NewtonSystem:
         m, n = self._shape
         if m < n:
             return None
-        return self._dense(entries, residual) if n <= DENSE else self._sparse(entries, residual)
+        limit = DENSE if m == n else DENSE_LEAST_SQUARES
+        return self._dense(entries, residual) if n <= limit else self._sparse(entries, residual)
 
     def _dense(self, entries, residual):
         m, n = self._shape
@@ -74,10 +76,18 @@ class NewtonSystem:
         m, n = self._shape
         M = sparse.csc_matrix((entries, (self._i, self._j)), shape=(m, n))
         try:
-            if m > n:
-                # the augmented form of the normal equations is better conditioned
-                augmented = sparse.bmat([[sparse.eye(m), M], [M.T, None]], format='csc')
-                return splu(augmented).solve(np.concatenate([residual, np.zeros(n)]))[m:]
-            return splu(M).solve(residual)
+            return _least_squares(M, residual) if m > n else splu(M).solve(residual)
         except RuntimeError:
             return None
+
+
+def _least_squares(M, residual):
+    """The least-squares solution by the augmented form of the normal equations, which is better conditioned; None if singular."""
+    m, n = M.shape
+    augmented = sparse.bmat([[sparse.eye(m), M], [M.T, None]], format='csc')
+    factors = splu(augmented)
+    # column i of the matrix is column perm_c[i] of the factors
+    largest = abs(augmented).max(axis=0).toarray().ravel()[np.argsort(factors.perm_c)]
+    if (np.abs(factors.U.diagonal()) < SINGULAR * largest).any():
+        return None
+    return factors.solve(np.concatenate([residual, np.zeros(n)]))[m:]

@@ -45,7 +45,8 @@ def solve_static_equations(model: Block, wrt: ContinuousSet) -> None:
 
 
 def _is_static(equation, times):
-    if not equation.equality or is_generated(equation) or times.time(equation) is not None:
+    # most equations are over time, and this is the cheapest question
+    if times.time(equation) is not None or not equation.equality or is_generated(equation):
         return False
     variables = list(identify_variables(equation.body, include_fixed=True))
     return all(times.time(v) is None for v in variables) and any(not v.fixed for v in variables)

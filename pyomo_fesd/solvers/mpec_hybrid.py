@@ -113,7 +113,8 @@ class MpecHybrid(CasadiSolver):
         with RunRecord(config.json_file, results, config) as record, log_streams(config.tee, config.log_file) as streams:
             table = (StartsTable if config.starts > 1 else LogTable)(streams)
             until = deadline(config, started)
-            with self._simulated_start(model, config, until, table) as start:
+            pause = PauseGC()
+            with pause, self._simulated_start(model, config, until, table) as start:
                 try:
                     ready = self._ready(model, config, until)
                 except Contradiction as error:
@@ -121,6 +122,8 @@ class MpecHybrid(CasadiSolver):
                 except OutOfTime:
                     fill_results(results, model, Run(Outcome.TIME_LIMIT), set_indicators, reason=COMPILING)
                 else:
+                    # from here on a run may be long, and leave garbage
+                    pause.close()
                     compiled = record.compiled = ready.compiled
                     table.begin(compiled)
                     shared = compiled, config, config.timer, ready.deadline, ready.cache
@@ -129,8 +132,9 @@ class MpecHybrid(CasadiSolver):
                     solver = (Multistart if config.starts > 1 else HybridSolver)(setup)
                     record.run = solver.run
                     fill_results(results, model, solver.solve(), set_indicators, compiled, names=user_names)
-                _explain(results, model, record, start)
-                loaded = self._load(results)
+                with PauseGC():
+                    _explain(results, model, record, start)
+                    loaded = self._load(results)
                 if not loaded:
                     start.restore()
                     StaleFlagManager.mark_all_as_stale()
@@ -139,7 +143,7 @@ class MpecHybrid(CasadiSolver):
         self._refuse_nonoptimal(results, f"{results.extra_info.outcome}. {results.extra_info.reason}")
         if loaded:
             feasible = results.solution_status in (SolutionStatus.optimal, SolutionStatus.feasible)
-            with phase(config.timer, 'review'):
+            with phase(config.timer, 'review'), PauseGC():
                 found = review(lambda: self._review(model, record), lambda failure: [failure]) if feasible else []
             results.extra_info.warnings = found
         return results
@@ -156,7 +160,7 @@ class MpecHybrid(CasadiSolver):
             with phase(config.timer, 'refresh'):
                 ready.refresh()
         else:
-            with phase(config.timer, 'compile'), PauseGC():
+            with phase(config.timer, 'compile'):
                 ready = PersistentModel(model, config, config.timer, deadline=deadline)
         with phase(config.timer, 'build'):
             ready.cache.prepare(config)
