@@ -198,8 +198,9 @@ class LegacyMpecHybrid(LegacyPlugin, MpecHybrid):
     def _own_keywords(self, kwds):
         # Pyomo's wrapper refuses the former names of our options
         for former, name in FORMER.items():
-            if kwds.get(former) is not None:
-                kwds[name] = kwds.pop(former)
+            given = kwds.pop(former, None)
+            if given is not None:
+                kwds[name] = given
         return super()._own_keywords(kwds)
 
     def _map_results(self, model, results):
