@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # the same names as in _ROOMS, for editors and type checkers
     from pyomo_fesd.core import FesdError, __version__
     from pyomo_fesd.estimation import at, parmest_solver
     from pyomo_fesd.finite_elements import recollocate
+    from pyomo_fesd.integers import decide_integers, sum_up_rounding
     from pyomo_fesd.modeling import (
         absolute,
         clip,
@@ -50,6 +51,7 @@ __all__ = [
     'clock',
     'contact',
     'covariance',
+    'decide_integers',
     'element_lengths',
     'friction',
     'maximum',
@@ -68,6 +70,7 @@ __all__ = [
     'start_from',
     'state_jump',
     'structure',
+    'sum_up_rounding',
     'sweep',
     'switches',
     'trajectory',
@@ -80,6 +83,7 @@ _ROOMS = {
     'core': ('FesdError', '__version__'),
     'estimation': ('at', 'parmest_solver'),
     'finite_elements': ('recollocate',),
+    'integers': ('decide_integers', 'sum_up_rounding'),
     'modeling': (
         *('absolute', 'clip', 'clock', 'contact', 'friction', 'maximum', 'minimum', 'positive_part', 'projection', 'signal'),
         'state_jump',

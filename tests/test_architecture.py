@@ -16,7 +16,7 @@ FLOORS = (
     ('diagnostics',),
     ('solvers',),
     ('simulation',),
-    ('starts', 'sensitivities', 'scenarios'),
+    ('starts', 'sensitivities', 'scenarios', 'integers'),
     ('refinement',),
 )
 #: The rooms inside a room, each importing only from those before it.
@@ -79,6 +79,7 @@ def test_public_names():
         'clock',
         'contact',
         'covariance',
+        'decide_integers',
         'element_lengths',
         'friction',
         'maximum',
@@ -97,6 +98,7 @@ def test_public_names():
         'start_from',
         'state_jump',
         'structure',
+        'sum_up_rounding',
         'sweep',
         'switches',
         'trajectory',

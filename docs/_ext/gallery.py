@@ -25,6 +25,8 @@ ORDER = (
     'gearbox_car',
     'projected_ellipse',
     'toy_mpec',
+    'pump_schedule',
+    'two_stage_tank',
     'idaes_overflow',
     'idaes_two_tanks',
     'idaes_level',

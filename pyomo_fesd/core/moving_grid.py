@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap
-from pyomo.core import Block, value
+from pyomo.core import Block, Model, value
 from pyomo.core.base.var import VarData
 from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity
@@ -172,5 +172,24 @@ Block.register_private_data_initializer(_MovingGrids, scope=_SCOPE)
 
 
 def moving_grids(block: Block) -> ComponentMap:
-    """Return the moving grids of the model that ``block`` belongs to: ContinuousSet -> MovingGrid."""
-    return block.model().private_data(_SCOPE).by_set
+    """Return the moving grids of the model that ``block`` belongs to: ContinuousSet -> MovingGrid.
+
+    Models that were transformed and then added to this one keep their grids.
+    """
+    model = block.model()
+    found = model.private_data(_SCOPE).by_set
+    embedded = [grid for part in _embedded_models(model) for grid in part.private_data(_SCOPE).by_set.items()]
+    return ComponentMap([*found.items(), *embedded]) if embedded else found
+
+
+def add_moving_grid(moving: MovingGrid) -> None:
+    """Record a moving grid on its model."""
+    moving.wrt.model().private_data(_SCOPE).by_set[moving.wrt] = moving
+
+
+def _embedded_models(model: Block) -> Iterator[Model]:
+    """Yield the models that are blocks of ``model``, as in the extensive form of a stochastic program, and those in them."""
+    for block in model.component_objects(Block, descend_into=False):
+        if isinstance(block, Model):
+            yield block
+            yield from _embedded_models(block)

@@ -16,6 +16,7 @@ from pyomo_fesd.core import (
     FesdError,
     MovingGrid,
     TimeIndex,
+    add_moving_grid,
     derivatives,
     discretised,
     find_continuous_set,
@@ -180,7 +181,8 @@ def _add_grid(instance, wrt, config):
     check_orders(model, wrt)
     block = Block()
     instance.add_component(unique_component_name(instance, GENERATED + 'elements_' + wrt.local_name), block)
-    moving_grids(instance)[wrt] = moving = MovingGrid(wrt, block, grid)
+    moving = MovingGrid(wrt, block, grid)
+    add_moving_grid(moving)
     add_lengths(moving, config.length_bounds, factors(config.final_time, config.stage_lengths, stages))
     return moving
 

@@ -30,6 +30,8 @@ from pyomo_fesd.simulation.newton import NewtonSystem
 
 #: Largest number of active sets tried at once, and of arrivals in one element; how often further sets are looked for.
 TRIED, ROUNDS = 8, 2
+#: Largest number of bisections until Newton's method finds the first arrival.
+BISECTIONS = 30
 
 
 @dataclass(frozen=True)
@@ -178,11 +180,10 @@ class ActiveSetStepper:
         """The element that ends where the first function arrives at zero; after the parts ``begins`` they are negative."""
         for _ in range(TRIED):
             event = min(begins, key=begins.get)
-            start = w.copy()
-            start[self._f.length] = most * begins[event]
-            found = self._system(active).solve(start)
-            found = self._system(active, event).solve(start if found is None else found)
+            found = self._end_at(w, active, event, most * begins[event])
             if found is None or not AT_ONCE * most < found[self._f.length] <= most:
+                found = self._first_arrival(w, active, event, most)
+            if found is None:
                 return None
             values, negative = self._signs.negative(found, active)
             if not negative:
@@ -191,6 +192,36 @@ class ActiveSetStepper:
             begins = {k: self._signs.begins(k, values[k], left[k]) for k in negative}
             if None in begins.values():
                 return None
+        return None
+
+    def _end_at(self, w, active, event, length):
+        """The element with a zero of the function ``event`` at its end, by Newton's method from an element of this ``length``."""
+        start = w.copy()
+        start[self._f.length] = length
+        found = self._system(active).solve(start)
+        return self._system(active, event).solve(start if found is None else found)
+
+    def _first_arrival(self, w, active, event, most):
+        """As ``_end_at``, with a length that bisection has enclosed.
+
+        A function that falls below zero and rises again has two zeros, of which Newton's method may find the later one, beyond the
+        element.
+        """
+        low, high = 0.0, most
+        for _ in range(BISECTIONS):
+            w = w.copy()
+            w[self._f.length] = length = 0.5 * (low + high)
+            w = self._system(active).solve(w)
+            if w is None:
+                return None
+            V = self._f.evaluate(w)[0]
+            if min(V[self._f.functions[event]].min(), V[self._f.ends[event]]) < 0:
+                high = length
+            else:
+                low = length
+            found = self._end_at(w, active, event, length)
+            if found is not None and max(low, AT_ONCE * most) <= found[self._f.length] <= high:
+                return found
         return None
 
     def _accept(self, w, length, active, values, event=None):

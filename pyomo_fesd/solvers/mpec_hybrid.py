@@ -40,6 +40,8 @@ from pyomo_fesd.solvers.user_names import user_names
 
 NAME = 'mpec_hybrid'
 COMPILING = "it was up while the model was compiled"
+#: Keywords of Pyomo's older solvers, and our options that mean the same.
+FORMER = {'logfile': 'log_file', 'warmstart': 'warm_start'}
 
 
 @document_class_CONFIG(methods=['solve'])
@@ -198,9 +200,11 @@ class LegacyMpecHybrid(LegacyPlugin, MpecHybrid):
     """``pyomo.environ.SolverFactory('mpec_hybrid')``: every option is also a keyword of ``solve``; see ``MpecHybrid``."""
 
     def _own_keywords(self, kwds):
-        if kwds.get('logfile') is not None:
-            # Pyomo's wrapper refuses its former name of our option
-            kwds['log_file'] = kwds.pop('logfile')
+        # Pyomo's wrapper refuses the former names of our options
+        for former, name in FORMER.items():
+            given = kwds.pop(former, None)
+            if given is not None:
+                kwds[name] = given
         return super()._own_keywords(kwds)
 
     def _map_results(self, model, results):

@@ -2,6 +2,7 @@
 
 import datetime
 import logging
+import math
 
 import casadi as ca
 from pyomo.common.timing import HierarchicalTimer
@@ -26,6 +27,8 @@ WRAPPED = (
     'writer_config',
 )
 RENAMED = {'timelimit': 'time_limit', 'options': 'solver_options'}
+#: Bounds of the objective that are not known: callers of the older interface calculate with them.
+NO_BOUNDS = {'lower_bound': -math.inf, 'upper_bound': math.inf}
 NO_OPTIONS = ('logfile', 'solnfile', 'report_timing', 'solver_io', 'suffixes', 'keepfiles')
 
 
@@ -122,4 +125,7 @@ class LegacyPlugin(LegacySolverWrapper):
         legacy, solution = super()._map_results(model, results)
         for name, entry in results.extra_info.items():
             setattr(legacy.solver, name, entry)
+        for name, unknown in NO_BOUNDS.items():
+            if getattr(legacy.problem, name) is None:
+                setattr(legacy.problem, name, unknown)
         return legacy, solution

@@ -18,6 +18,7 @@ REFUSED = {
     SOSConstraint: "write it as a Complementarity, or deactivate it",
     DerivativeVar: "discretise the model first, e.g. with fesd.finite_elements",
 }
+INTEGERS = "pyomo_fesd.decide_integers solves for its values one after the other; or fix it, or relax its domain"
 
 
 def refuse_unready(model: Block, solver: str) -> None:
@@ -38,7 +39,7 @@ def refuse_unready(model: Block, solver: str) -> None:
         _refuse_stale(integral, solver)
     for v in model.component_data_objects(Var, active=True, descend_into=Block):
         if not v.fixed and not v.is_continuous():
-            raise FesdError(v, "an integer variable", f"fix it, or relax its domain: {solver} does not decide integers")
+            raise FesdError(v, f"an integer variable, which {solver} does not decide", INTEGERS)
     grids = moving_grids(model)
     for component, kind in _need_moving_elements(model):
         if not any(wrt in grids for wrt in continuous_sets(component)):

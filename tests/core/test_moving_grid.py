@@ -109,3 +109,19 @@ def test_inner_boundaries_lie_inside_control_stages():
     grid = moving_grids(m)[m.t].grid
     assert [(e.n, f.n) for e, f in grid.inner_boundaries()] == [(1, 2), (2, 3), (3, 4)]
     assert [e.own_labels for e in grid.elements] == [e.points for e in grid.elements]
+
+
+def test_models_that_are_added_to_another_keep_their_grids():
+    whole = pyo.ConcreteModel()
+    whole.first, whole.second = transform(signum.build(), 5, 2), transform(signum.build(), 4, 2)
+    grids = moving_grids(whole)
+    assert list(grids) == [whole.first.t, whole.second.t] and moving_grids(whole.second.x) == grids
+    pyomo_fesd.simulate(whole.first)
+    pyo.SolverFactory('mpec_hybrid').solve(whole)
+    for part in (whole.first, whole.second):
+        (switch,) = pyomo_fesd.switches(part)
+        assert switch.time == pytest.approx(signum.SWITCH, abs=1e-9)
+    copy = whole.clone()
+    assert list(moving_grids(copy)) == [copy.first.t, copy.second.t]
+    whole.del_component(whole.first)
+    assert list(moving_grids(whole)) == [whole.second.t]

@@ -312,3 +312,30 @@ def test_phases_are_on_the_timer():
 def test_elements_of_a_class_are_compiled_once():
     _, timer = simulated(transform(gas_liquid_tank.build(), 30, 3))
     assert calls(timer, 'compile') == 1 and calls(timer, 'newton') == 60
+
+
+def bump(horizon):
+    """Slides with the fraction 1/2 + 3/5 exp(-4 (t - 1)^2), which is above 1 from t_s on, and below 1 again after 2 - t_s."""
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, horizon))
+    m.tau = pyomo_fesd.clock(m.t)
+    m.x = pyo.Var(m.t, initialize=0)
+    m.dx = dae.DerivativeVar(m.x)
+    m.x[0].fix(0)
+    m.feed = pyo.Expression(m.t, rule=lambda m, t: 0.5 + 0.6 * pyo.exp(-4 * (m.tau[t] - 1) ** 2))
+    m.outlet = Disjunction(
+        m.t,
+        rule=lambda m, t: [[m.x[t] <= 0, m.dx[t] == m.feed[t]], [m.x[t] >= 0, m.dx[t] == m.feed[t] - 1]],
+    )
+    transform(m, nfe=10, ncp=2)
+    return m
+
+
+@pytest.mark.parametrize('horizon', [11.8, 12.0, 12.12, 12.134])
+def test_a_slide_ends_at_the_first_of_two_zeros_in_an_element(horizon):
+    # from the end of the first element Newton's method finds the zero beyond it, where the fraction is below 1 again
+    m = bump(horizon)
+    pyomo_fesd.simulate(m)
+    leaves, returns = pyomo_fesd.switches(m)
+    assert leaves.time == pytest.approx(1 - sqrt(log(1.2) / 4), abs=1e-9)
+    assert (leaves.after, returns.before) == ('mode 2', 'mode 2')

@@ -87,6 +87,28 @@ def test_options_of_one_call_do_not_outlive_it():
     assert solver.solve(toy()).solver.steps[0].eps == pytest.approx(1.0)
 
 
+def test_the_older_name_of_a_warm_start_is_known():
+    m = toy()
+    pyo.SolverFactory('mpec_hybrid').solve(m)
+    again = pyo.SolverFactory('mpec_hybrid').solve(m, warmstart=True, tee=False, load_solutions=True)
+    assert again.solver.steps[0].kind == 'branch'
+    pyo.SolverFactory('mpec_hybrid').solve(m, warmstart=None)
+
+
+@pytest.mark.parametrize('sense', [pyo.minimize, pyo.maximize])
+def test_bounds_that_are_not_known_are_infinite_in_the_older_interface(sense):
+    # progressive hedging of mpi-sppy calculates with them
+    m = pyo.ConcreteModel()
+    m.x = pyo.Var(bounds=(0, 2), initialize=1)
+    m.y = pyo.Var(bounds=(0, None), initialize=1)
+    m.c = Complementarity(expr=complements(m.x >= 0, m.y >= 0))
+    m.o = pyo.Objective(expr=sense * ((m.x - 1) ** 2 + (m.y - 0.5) ** 2), sense=sense)
+    problem = pyo.SolverFactory('mpec_hybrid').solve(m).problem
+    known, unknown = ('upper_bound', 'lower_bound') if sense == pyo.minimize else ('lower_bound', 'upper_bound')
+    assert getattr(problem, known) == pytest.approx(sense * 0.25, abs=1e-6)
+    assert getattr(problem, unknown) == -sense * float('inf')
+
+
 def test_unknown_option_is_named():
     with pytest.raises(FesdError, match='unknown option.*no_such_thing'):
         pyo.SolverFactory('mpec_hybrid').solve(toy(), options={'no_such_thing': 1})
