@@ -28,14 +28,14 @@ def leaner_gas(m):
     )
 
 
-# Fixed bed without space, with energy balance: the same gas is used until the solid has cooled
+# Fixed bed without space, with energy balance: the gas becomes leaner where the solid has cooled
 
 
 def bed_0d(nfe):
     from idaes.models_extra.gas_solid_contactors.unit_models.tests import test_FB0D
 
-    m = fixture(test_FB0D.TestIronOC, 'iron_oc')
-    m.fs.unit.initialize()
+    m = fixture(test_FB0D.TestIronOC, 'iron_oc_unscaled')
+    m.fs.unit.initialize(optarg={'tol': 1e-6})
     return m
 
 

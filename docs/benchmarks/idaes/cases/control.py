@@ -5,8 +5,6 @@ from benchmarks.idaes.cases.case import Case, flowsheet_time
 from benchmarks.idaes.cases.published import fixture, replaced
 from pyomo.gdp import Disjunction
 
-import pyomo_fesd
-
 
 def limits_as_modes(m, pid):
     """The output of a PIDController within its limits, as three modes, for the reference."""
@@ -82,20 +80,6 @@ def steam_tanks(antiwindup):
 
 
 def exact_valve(m):
-    pyo.TransformationFactory('fesd.smooth_to_complementarity').apply_to(m, wrt=m.fs.time)
-
-
-def exact_valve_and_integration(m):
-    pid = m.fs.ctrl
-    pid.mv_integration_eqn.deactivate()
-    pid.held = pyomo_fesd.units.anti_windup(
-        m.fs.time,
-        integral_rate=pid.mv_integral_component_dot,
-        rate=lambda b, t: pid.gain_i[t] * pid.error[t],
-        command=pid.mv_unbounded,
-        low=0,
-        high=1,
-    )
     pyo.TransformationFactory('fesd.smooth_to_complementarity').apply_to(m, wrt=m.fs.time)
 
 

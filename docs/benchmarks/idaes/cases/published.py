@@ -22,7 +22,7 @@ def replaced(module, **members):
         vars(module).update(before)
 
 
-def made_dynamic(test, owner, end, nfe, name='sapon', **more):
+def made_dynamic(test, owner, end, nfe, name='sapon', complete=None):
     """The model of a fixture of steady tests over time: at rest, inputs held, Radau's scheme with three points in time.
 
     Parameters
@@ -30,15 +30,18 @@ def made_dynamic(test, owner, end, nfe, name='sapon', **more):
     test : module whose ``FlowsheetBlock`` is made dynamic
     owner : class of tests that has the fixture ``name``
     end, nfe : horizon in s, elements
-    more : other members of the module to be replaced
+    complete : callable (model), or None
+        fixes what a holdup needs besides, such as its volume
     """
     import pyomo.environ as pyo
     from pyomo.dae.flatten import flatten_dae_components
 
     original = test.FlowsheetBlock
     options = {'dynamic': True, 'time_set': [0, end], 'time_units': pyo.units.s}
-    with replaced(test, FlowsheetBlock=lambda **_: original(**options), **more):
+    with replaced(test, FlowsheetBlock=lambda **_: original(**options)):
         m = fixture(owner, name)
+    if complete is not None:
+        complete(m)
     pyo.TransformationFactory('dae.collocation').apply_to(m, wrt=m.fs.time, nfe=nfe, ncp=3)
     for family in flatten_dae_components(m, m.fs.time, pyo.Var)[1]:
         if family[0].fixed:
@@ -69,7 +72,7 @@ def finer(nfe):
     return Transformation
 
 
-def model_of(test, method, **captured_by):
+def model_of(test, method):
     """The model that a method of a test builds and solves for itself, taken from its call of ``degrees_of_freedom``."""
     models, count = [], test.degrees_of_freedom
 

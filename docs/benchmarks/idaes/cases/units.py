@@ -61,19 +61,9 @@ def more_feed(m):
 def heater(nfe):
     from idaes.models.unit_models.tests import test_heater as test
 
-    m = made_dynamic(test, test.TestSaponification, 10, nfe, Heater=_with_volume(test.Heater))
+    m = made_dynamic(test, test.TestSaponification, 10, nfe, complete=lambda m: m.fs.unit.control_volume.volume.fix(1.5e-3))
     later(m.fs.unit.inlet.temperature, 315)
     return m
-
-
-def _with_volume(unit):
-    """A unit whose holdup gets a volume, which its steady test does not have."""
-
-    def build(**options):
-        made = unit(**options)
-        return made
-
-    return build
 
 
 def less_heat(m):
@@ -86,6 +76,36 @@ def less_heat(m):
         else [
             [m.fs.unit.outlet.temperature[t] <= 319, m.fs.unit.heat_duty[t] == 1000],
             [m.fs.unit.outlet.temperature[t] >= 319, m.fs.unit.heat_duty[t] == 500],
+        ],
+    )
+
+
+# Two phases in equilibrium (smooth VLE): the same for benzene and toluene
+
+
+def boiling_heater(nfe):
+    from idaes.models.unit_models.tests import test_heater as test
+
+    def closure(m):
+        m.fs.unit.control_volume.volume.fix(1)
+        m.fs.unit.control_volume.phase_fraction[:, 'Liq'].fix(0.1)
+
+    m = made_dynamic(test, test.TestBT_Generic, 10, nfe, name='btg', complete=closure)
+    later(m.fs.unit.heat_duty, 0)
+    return m
+
+
+def more_heat(m):
+    for t in list(m.fs.time)[1:]:
+        m.fs.unit.heat_duty[t].unfix()
+    warm = m.fs.unit.outlet.temperature[0].value + 0.5
+    m.fs.thermostat = Disjunction(
+        m.fs.time,
+        rule=lambda b, t: Disjunction.Skip
+        if t == 0
+        else [
+            [m.fs.unit.outlet.temperature[t] <= warm, m.fs.unit.heat_duty[t] == 0],
+            [m.fs.unit.outlet.temperature[t] >= warm, m.fs.unit.heat_duty[t] == -1000],
         ],
     )
 
@@ -179,6 +199,7 @@ CASES = {
     'CSTR': Case(TESTS + 'test_cstr.py: TestSaponification', cstr, cooler, flowsheet_time, (10, 20)),
     'plug flow': Case(TESTS + 'test_pfr.py: TestSaponification', plug_flow, more_feed, flowsheet_time, (10, 20)),
     'heater': Case(TESTS + 'test_heater.py: TestSaponification', heater, less_heat, flowsheet_time, (10, 20)),
+    'two-phase heater': Case(TESTS + 'test_heater.py: TestBT_Generic', boiling_heater, more_heat, flowsheet_time, (10,)),
     'heat exchanger 1D': Case(
         TESTS + 'test_heat_exchanger_1D.py: TestSaponification_cocurrent', exchanger_1d, more_coolant, flowsheet_time, (6,)
     ),

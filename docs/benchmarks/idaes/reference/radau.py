@@ -17,6 +17,8 @@ A = np.array(
     ]
 )
 ORDER, NEWTON_STEPS = 5, 25
+#: Unknowns of a step up to which a dense factorisation is faster.
+DENSE = 200
 
 
 class NoStep(Exception):
@@ -45,7 +47,7 @@ class Path:
     steps: int = 0
 
 
-def integrate(stages, tolerance=1e-8, longest=0.02, slack=1e-9):
+def integrate(stages, tolerance=1e-7, longest=0.05, slack=1e-9):
     """Integrate over stages, each with its own equations.
 
     Parameters
@@ -81,6 +83,12 @@ class _Run:
     def __init__(self, equations, tolerance, slack, horizon):
         self.eq, self.tolerance, self.slack, self.horizon = equations, tolerance, slack, horizon
         self.first, self.size = equations.first, np.abs(equations.first)
+        count, n = len(equations.states), len(equations.names)
+        numbers, ones = np.arange(count), np.ones(count)
+        pick = [sp.csr_matrix((ones, (numbers, where)), (count, n)) for where in (equations.states, equations.rates)]
+        self._states, self._rates = sp.kron(sp.eye(3), pick[0]).tocsr(), sp.kron(A, pick[1]).tocsr()
+        if 3 * n <= DENSE:
+            self._states_full, self._rates_full = self._states.toarray(), self._rates.toarray()
 
     def to(self, end, t, x, mode, longest, path):
         """Integrate to ``end``; returns the last time, w and mode."""
@@ -204,31 +212,45 @@ class _Run:
         return np.concatenate([*algebra, (w[:, eq.states] - x - h * A @ w[:, eq.rates]).ravel()])
 
     def _system(self, w, x, h, mode):
-        eq, n = self.eq, len(self.eq.names)
-        count = len(eq.states)
-        rows = np.arange(count)
-        pick = sp.csr_matrix((np.ones(count), (rows, eq.states)), (count, n))
-        rate = sp.csr_matrix((np.ones(count), (rows, eq.rates)), (count, n))
-        upper = sp.block_diag([eq.jacobian(point, mode) for point in w])
-        lower = sp.kron(sp.eye(3), pick) - h * sp.kron(A, rate)
-        return self._residual(w, x, h, mode), sp.vstack([upper, lower]).tocsc()
+        if w.size > DENSE:
+            algebra = sp.block_diag([self.eq.jacobian(point, mode) for point in w])
+            return self._residual(w, x, h, mode), sp.vstack([algebra, self._states - h * self._rates]).tocsc()
+        n, blocks = w.shape[1], [self.eq.jacobian(point, mode).toarray() for point in w]
+        rows = len(blocks[0])
+        matrix = np.zeros((3 * rows + self._states.shape[0], 3 * n))
+        for k, block in enumerate(blocks):
+            matrix[k * rows : (k + 1) * rows, k * n : (k + 1) * n] = block
+        matrix[3 * rows :] = self._states_full - h * self._rates_full
+        return self._residual(w, x, h, mode), matrix
 
 
 def _solve(matrix, rhs):
-    """Solve with rows and columns brought to size one, three times in turn."""
+    """Solve with rows and columns brought to size one, twice in turn."""
     if matrix.shape[0] != matrix.shape[1]:
         raise Failure(f"{matrix.shape[0]} equations for {matrix.shape[1]} unknowns")
-    row, column = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
-    scaled = matrix
-    for _ in range(3):
-        for axis, factors in ((1, row), (0, column)):
-            largest = np.asarray(abs(scaled).max(axis=axis).todense()).ravel()
-            factors /= np.where(largest > 0, np.sqrt(largest), 1.0)
-            scaled = sp.diags(row) @ matrix @ sp.diags(column)
+    row, column, dense = np.ones(len(rhs)), np.ones(len(rhs)), isinstance(matrix, np.ndarray)
+    size = abs(matrix)
+    for _ in range(2):
+        row = 1 / _positive(_largest(size @ _diagonal(column, dense), 1))
+        column = 1 / _positive(_largest(_diagonal(row, dense) @ size, 0))
+    scaled = _diagonal(row, dense) @ matrix @ _diagonal(column, dense)
     try:
-        return column * splu(scaled.tocsc()).solve(row * rhs)
-    except RuntimeError as error:
+        return column * (np.linalg.solve(scaled, row * rhs) if dense else splu(scaled.tocsc()).solve(row * rhs))
+    except (RuntimeError, np.linalg.LinAlgError) as error:
         raise NoStep from error
+
+
+def _diagonal(factors, dense):
+    return np.diag(factors) if dense else sp.diags(factors)
+
+
+def _largest(size, axis):
+    found = size.max(axis=axis)
+    return found if isinstance(found, np.ndarray) else found.toarray().ravel()
+
+
+def _positive(numbers):
+    return np.where(numbers > 0, numbers, 1.0)
 
 
 def _changes(one, other):
