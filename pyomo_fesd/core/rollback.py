@@ -100,8 +100,9 @@ def _remember_components(model):
 
 
 def _remember_indices(model):
-    """Indices of components, and members of generated Sets."""
-    indices = ComponentMap((c, set(c._data)) for c in model.component_objects(descend_into=PLACES) if c.is_indexed())
+    """Indices of components, and members of generated Sets; a Reference follows the components that it refers to."""
+    indexed = (c for c in model.component_objects(descend_into=PLACES) if c.is_indexed() and not c.is_reference())
+    indices = ComponentMap((c, set(c._data)) for c in indexed)
     sets = (s for s in model.component_objects(Set, descend_into=PLACES) if is_generated(s) and isinstance(s, FiniteSetData))
     members = [(s, set(s)) for s in sets]
 

@@ -120,15 +120,16 @@ class TimeIndex:
         return time, full
 
     def time(self, data):
-        """Time label of ``data``, or None."""
-        _, _, inner, _, position = self._place(data.parent_component())
-        return inner if position is None else index_tuple(data.index())[position]
+        """Time label of ``data``, or None; of a whole indexed component, as a Suffix may hold, that of the block it is on."""
+        component = data.parent_component()
+        _, _, inner, _, position = self._place(component)
+        return inner if position is None or _is_whole(data) else index_tuple(data.index())[position]
 
     def at(self, data, label):
-        """The data of the same name at another time; None if ``data`` has no time."""
+        """The data, or the whole component, of the same name at another time; None if ``data`` has no time."""
         component = data.parent_component()
         position = self._place(component).position
-        if position is not None:
+        if position is not None and not _is_whole(data):
             index = _replaced(index_tuple(data.index()), position, label)
             return component[index if len(index) > 1 else index[0]]
         block = data.parent_block()
@@ -136,7 +137,7 @@ class TimeIndex:
         if other is None:
             return None
         found = other.component(component.local_name)
-        return found[data.index()] if component.is_indexed() else found
+        return found[data.index()] if component.is_indexed() and not _is_whole(data) else found
 
     def families(self, datas) -> dict:
         """Group ``datas`` by name: ``{"unit[a].hyb[*].dj": {time label: data}}``; data without time are left out."""
@@ -146,6 +147,11 @@ class TimeIndex:
             if time is not None:
                 groups[name][time] = data
         return dict(groups)
+
+
+def _is_whole(data):
+    """Whether this is an indexed component and not one of its data."""
+    return data is data.parent_component() and data.is_indexed()
 
 
 def _replaced(index, position, new):

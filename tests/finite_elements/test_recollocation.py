@@ -180,3 +180,42 @@ def test_nothing_is_said_of_other_orders_and_where_nothing_switches(caplog):
     caplog.clear()
     move(m)
     assert 'order 1' not in caplog.text
+
+
+def in_blocks():
+    """x' = -x with two numbers on a Block over time, and References to them as ports have; a factor for a whole component."""
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, END))
+    m.x = pyo.Var(m.t, initialize=1.0)
+    m.dx = dae.DerivativeVar(m.x)
+    m.side = pyo.Block(m.t, rule=lambda b, t: b.add_component('v', pyo.Var([1, 2], initialize=3)))
+    m.port = pyo.Reference(m.side[:].v[1])
+    m.ports = pyo.Reference(m.side[:].component('v')[...])
+    m.balance = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == -m.x[t])
+    m.equal = pyo.Constraint(m.t, [1, 2], rule=lambda m, t, k: m.side[t].v[k] == k * m.x[t])
+    pyo.TransformationFactory('dae.finite_difference').apply_to(m, nfe=4, scheme='BACKWARD')
+    m.x[0].fix(1.0)
+    m.scaling_factor = pyo.Suffix(direction=pyo.Suffix.EXPORT)
+    for t in m.t:
+        m.scaling_factor[m.side[t].v] = 10
+    m.scaling_factor[m.x] = 2
+    return m
+
+
+def test_a_factor_for_a_whole_component_is_continued():
+    m = in_blocks()
+    pyomo_fesd.recollocate(m, ncp=3)
+    assert len(m.t) == 13 and all(m.scaling_factor[m.side[t].v] == 10 for t in m.t) and m.scaling_factor[m.x] == 2
+
+
+def test_after_a_failure_references_are_as_they_were(monkeypatch):
+    m = in_blocks()
+    labels, port = list(m.t), list(m.port)
+
+    def fails(self):
+        raise RuntimeError('in the middle')
+
+    monkeypatch.setattr('pyomo_fesd.finite_elements.inner_points.InnerPoints.complete', fails)
+    with pytest.raises(RuntimeError, match='in the middle'):
+        pyomo_fesd.recollocate(m, ncp=3)
+    assert list(m.t) == labels and list(m.port) == port and len(m.side) == len(labels)

@@ -28,7 +28,7 @@ from pyomo_fesd.mpcc.compile.parameters import parameter_values
 from pyomo_fesd.mpcc.compile.round_off import EXACT
 from pyomo_fesd.mpcc.compile.scaled_functions import LARGE, ScaledFunctions, ScaledRows
 from pyomo_fesd.mpcc.compile.scaling import Scale, side_factors
-from pyomo_fesd.mpcc.compile.sizes import row_factors, variable_factors, without_small
+from pyomo_fesd.mpcc.compile.sizes import beside, row_factors, variable_factors, without_small
 
 UNBOUNDED = (-np.inf, np.inf)
 #: Variables of a nonlinear model that may be scaled by coefficients.
@@ -102,8 +102,9 @@ class _Assembly:
         alike = [[columns[id(v)] for v in group if id(v) in columns] for group in self._problem.hints.alike]
         alike = [group for group in alike if group]
         s_x = variable_factors(J, (certain, constants), self._start, stated_bounds(self._variables), user.x, alike)
-        J = csr(self._rows.rows.jacobian(self._at(self._start)))
-        return replace(user, x=s_x, g=row_factors(J @ sparse.diags(1 / s_x), user.g))
+        points = (self._start, beside(self._start))
+        jacobians = [csr(self._rows.rows.jacobian(self._at(w))) @ sparse.diags(1 / s_x) for w in points]
+        return replace(user, x=s_x, g=row_factors(jacobians, user.g))
 
     def _linearised(self, w):
         """Jacobian of rows and sides, and the sizes of their distances from bounds where the variables are 0.

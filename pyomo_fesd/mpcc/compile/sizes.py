@@ -25,6 +25,8 @@ import numpy as np
 MILD_SIZES, MILD_ROWS = (1e-3, 2e6), (1e-3, 1e6)
 #: Sizes beyond these are start values without a meaning.
 SIZES = (1e-30, 1e30)
+#: Relative distance of a point beside the start.
+NEAR = 1e-2
 #: Sweeps through the rows.
 SWEEPS = 20
 
@@ -65,10 +67,25 @@ def variable_factors(J, constants: Sequence, start: np.ndarray, bounds: tuple, g
     return np.where(given != 1.0, given, _factors(sizes, MILD_SIZES))
 
 
-def row_factors(J, given: np.ndarray) -> np.ndarray:
-    """Return the factors of rows with the Jacobian ``J`` in scaled variables; one of the user (not 1) is kept."""
-    largest = abs(J).max(axis=1).toarray().ravel() if J.shape[1] else np.zeros(J.shape[0])
-    return np.where(given != 1.0, given, _factors(largest, MILD_ROWS))
+def beside(start: np.ndarray) -> np.ndarray:
+    """Return a point beside the start, by 1 % of each variable, in directions that are always the same."""
+    return start * (1 + NEAR * np.random.default_rng(0).uniform(-1, 1, start.size))
+
+
+def row_factors(jacobians: Sequence, given: np.ndarray) -> np.ndarray:
+    """Return the factors of rows; one of the user (not 1) is kept.
+
+    A row whose gradient is large at one of the points only is near a singularity there, such as a logarithmic mean of equal numbers.
+    It is not large, and with the factor 1/gradient nothing would be left of it: the least of the largest entries counts.
+
+    Parameters
+    ----------
+    jacobians : list of csr (rows, n)
+        in scaled variables, at points near one another; rows that have no value at a point are judged by the others
+    given : array (rows)
+    """
+    largest = [abs(J).max(axis=1).toarray().ravel() if J.shape[1] else np.zeros(J.shape[0]) for J in jacobians]
+    return np.where(given != 1.0, given, _factors(np.fmin.reduce([np.where(np.isfinite(g), g, np.nan) for g in largest]), MILD_ROWS))
 
 
 def _factors(sizes, mild):

@@ -133,7 +133,13 @@ def test_variables_that_are_alike_have_one_size():
 @settings(max_examples=100, deadline=None)
 def test_factors_are_powers_of_two_and_bring_rows_near_one(exponents):
     J = sparse.diags([10.0**e for e in exponents]).tocsr()
-    s = row_factors(J, np.ones(len(exponents)))
+    s = row_factors([J], np.ones(len(exponents)))
     assert np.all(np.log2(s) == np.round(np.log2(s)))
     scaled = abs(sparse.diags(s) @ J).max(axis=1).toarray()
     assert scaled.min() >= MILD_SIZES[0] * 0.7 and scaled.max() <= MILD_SIZES[1]
+
+
+def test_the_least_of_the_large_gradients_counts_and_a_row_without_a_value_is_judged_elsewhere():
+    at, near = (sparse.csr_matrix([[entry] for entry in entries]) for entries in ([1e20, 1e9, np.nan], [1.0, 1.01e9, 1e9]))
+    s = row_factors([at, near], np.ones(3))
+    assert s[0] == 1.0 and s[1:] == pytest.approx(1e-9, rel=0.5)

@@ -1,0 +1,102 @@
+"""Beds of solids with gas."""
+
+import pyomo.environ as pyo
+from benchmarks.idaes.cases.case import Case, flowsheet_time
+from benchmarks.idaes.cases.published import fixture
+from pyomo.gdp import Disjunction
+
+# Thermogravimetric analyser: the gas becomes leaner where half of the oxygen is used
+
+
+def tga(nfe):
+    from idaes.models_extra.gas_solid_contactors.flowsheets import dyn_TGA_example
+
+    return dyn_TGA_example.main(pyo.ConcreteModel())
+
+
+def leaner_gas(m):
+    fs, bed = m.fs, m.fs.TGA
+    half = 0.5 * pyo.value(bed.solids_material_holdup[0, 'Fe2O3'])
+    for t in fs.time:
+        bed.gas[t].mole_frac_comp['CH4'].unfix()
+    fs.lean = Disjunction(
+        fs.time,
+        rule=lambda b, t: [
+            [bed.solids_material_holdup[t, 'Fe2O3'] >= half, bed.gas[t].mole_frac_comp['CH4'] == 0.1],
+            [bed.solids_material_holdup[t, 'Fe2O3'] <= half, bed.gas[t].mole_frac_comp['CH4'] == 0.05],
+        ],
+    )
+
+
+# Fixed bed without space, with energy balance: the gas becomes leaner where the solid has cooled
+
+
+def bed_0d(nfe):
+    from idaes.models_extra.gas_solid_contactors.unit_models.tests import test_FB0D
+
+    m = fixture(test_FB0D.TestIronOC, 'iron_oc_unscaled')
+    m.fs.unit.initialize(optarg={'tol': 1e-6})
+    return m
+
+
+def leaner_when_cool(m):
+    fs, bed = m.fs, m.fs.unit
+    for t in fs.time:
+        bed.gas[t].mole_frac_comp['CH4'].unfix()
+    fs.lean = Disjunction(
+        fs.time,
+        rule=lambda b, t: [
+            [bed.solids[t].temperature >= 1250, bed.gas[t].mole_frac_comp['CH4'] == 0.1],
+            [bed.solids[t].temperature <= 1250, bed.gas[t].mole_frac_comp['CH4'] == 0.05],
+        ],
+    )
+
+
+# Fixed bed with space: the gas is throttled where the solid has cooled at the inlet
+
+
+def bed_1d(nfe):
+    from idaes.models_extra.gas_solid_contactors.unit_models.tests import test_FB1D
+
+    m = test_FB1D.build_model()
+    test_FB1D.set_scaling(m)
+    m.fs.unit.initialize(optarg={'tol': 1e-5, 'bound_push': 1e-22, 'nlp_scaling_method': 'user-scaling'})
+    return m
+
+
+def throttle(m):
+    fs, bed = m.fs, m.fs.unit
+    middle = list(bed.length_domain)[5]
+    cool = pyo.value(bed.solid_properties[0, middle].temperature) - 20
+    bed.gas_inlet.flow_mol.unfix()
+    bed.gas_inlet.flow_mol[0].fix()
+    fs.gate = Disjunction(
+        fs.time,
+        rule=lambda b, t: Disjunction.Skip
+        if t == fs.time.first()
+        else [
+            [bed.solid_properties[t, middle].temperature >= cool, bed.gas_inlet.flow_mol[t] == 20],
+            [bed.solid_properties[t, middle].temperature <= cool, bed.gas_inlet.flow_mol[t] == 10],
+        ],
+    )
+
+
+CASES = {
+    'TGA': Case(
+        'models_extra/gas_solid_contactors/flowsheets/dyn_TGA_example.py: main', tga, leaner_gas, flowsheet_time, (100,)
+    ),
+    'fixed bed 0D': Case(
+        'models_extra/gas_solid_contactors/unit_models/tests/test_FB0D.py: TestIronOC',
+        bed_0d,
+        leaner_when_cool,
+        flowsheet_time,
+        (10,),
+    ),
+    'fixed bed 1D': Case(
+        'models_extra/gas_solid_contactors/unit_models/tests/test_FB1D.py: build_model',
+        bed_1d,
+        throttle,
+        flowsheet_time,
+        (3,),
+    ),
+}
