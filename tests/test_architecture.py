@@ -17,7 +17,7 @@ FLOORS = (
     ('solvers',),
     ('simulation',),
     ('starts', 'sensitivities', 'scenarios'),
-    ('refinement',),
+    ('refinement', 'control'),
 )
 #: The rooms inside a room, each importing only from those before it.
 INNER = {

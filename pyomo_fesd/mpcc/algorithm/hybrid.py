@@ -20,6 +20,8 @@ from pyomo_fesd.mpcc.algorithm.subsolves import Subsolves
 PATIENCE = 0.5
 #: Other starts of a problem with few pairs, before it is called infeasible.
 RESTARTS = 3
+#: Value of the option ``warm_start`` with which the run ends at the branch of the start values.
+ONLY = 'only'
 #: Times that a better order of changes is made even again.
 ROUNDS = 3
 
@@ -79,7 +81,10 @@ class HybridSolver:
         """The whole algorithm."""
         if self._starts_at_a_solution():
             return Outcome.SOLVED
-        if not (self._options.warm_start and self._from_values()):
+        certified = bool(self._options.warm_start) and self._from_values()
+        if not certified and self._options.warm_start == ONLY:
+            return Outcome.NO_BRANCH if self.run.point is None else Outcome.FEASIBLE
+        if not certified:
             self._complete()
             if self.run.point is None:
                 self._follow_path()
@@ -168,7 +173,8 @@ class HybridSolver:
     def _from_values(self):
         """Whether the branch that the start values name leads to a certified point."""
         self._subsolves.keep_least_infeasible(self._c.x0)
-        self._branches.explore_from(self._c.x0, False)
+        if not self._branches.explore_decided(self._c.x0):
+            self._branches.explore_from(self._c.x0, False)
         return self.run.point is not None and self.run.point.certificate.certified
 
     def _start_is_better(self):
