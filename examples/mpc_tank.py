@@ -109,7 +109,7 @@ def plant():
     """Build the plant over one interval; its valve is smaller than that of the model."""
     m = build(1, VALVE)
     m.loss = dae.Integral(m.t, rule=stage_cost)
-    return pyomo_fesd.Plant(transform(m, 10), [m.u])
+    return pyomo_fesd.Plant(transform(m, 20), [m.u])
 
 
 class Estimator:
@@ -127,14 +127,15 @@ class Estimator:
             m.component(name).setlb(0)
             m.component(name).unfix()
             m.component(name).set_value(feed)
-        # the last intervals count most; the nominal feeds keep it regular
+        # the last intervals count most; while the level slides, only the sum of the
+        # feeds can be seen, and the nominal ones decide
         m.misfit = pyo.Objective(
             expr=sum(
                 0.5 ** (PAST - k) * (w * (m.component(x)[t] - m.seen[k, x])) ** 2
                 for k, t in enumerate(list(m.t)[1:], start=1)
                 for x, w in (('M_G', 10.0), ('M_L', 1.0))
             )
-            + 1e-4 * sum((m.component(x) - f) ** 2 for x, f in FEEDS.items())
+            + 0.01 * sum((m.component(x) / f - 1) ** 2 for x, f in FEEDS.items())
         )
         m.u.fix()
         self._ends = list(m.t)
@@ -160,7 +161,7 @@ class Estimator:
                 m.seen[k, name] = amount
         for name, amount in self.past[0][0].items():
             m.component(name)[0].set_value(amount)
-        found = self._solver.solve(m, warm_start=True)
+        found = self._solver.solve(m, warm_start=True, review=False)
         if found.solver.status != 'ok':
             return FEEDS
         return {name: m.component(name).value for name in FEEDS}

@@ -32,8 +32,9 @@ from pyomo_fesd.mpcc import Deadline
 
 #: Where an answer comes from.
 BRANCH, SIMULATED, FULL, DEADLINE, PLAN = ORIGINS = ('branch', 'simulated branch', 'full run', 'deadline', 'plan')
-#: Options of the attempts of a step that has a plan, and of the first step.
-SHIFTED, FALL_BACK, FIRST = {'warm_start': 'only'}, {'simulate_first': True}, {}
+#: Options of the attempts of a step, and where their certified solutions come from unless a homotopy was needed; without a plan
+#: the first attempt is left out.
+ATTEMPTS = ({'warm_start': 'only'}, BRANCH), ({'simulate_first': True}, SIMULATED)
 #: Seconds left without which no further attempt begins.
 LEAST = 1e-3
 
@@ -135,7 +136,7 @@ class Controller:
             self.interface.load_data(measured, time_points=[self.interface.time.first()])
         self.interface.load_modes(modes)
         search = _Search(self, deadline)
-        search.run((SHIFTED, FALL_BACK) if self._has_plan else (FIRST,))
+        search.run(ATTEMPTS if self._has_plan else ATTEMPTS[1:])
         self._has_plan = self._has_plan or search.best is not None
         return search.answer(began, self.present_controls())
 
@@ -178,7 +179,7 @@ class _Search:
 
     def run(self, attempts):
         """Make attempts until one is certified; the model has the values of the best one, or those of the plan."""
-        for options in attempts:
+        for options, origin in attempts:
             left = self._deadline.left()
             if left is not None and left < LEAST:
                 self._late = True
@@ -186,7 +187,7 @@ class _Search:
             results = self._controller.solve(options, left)
             self._results.append(results)
             if self._improves(results):
-                self.best, self._values, self._origin = results, self._controller.values(), _origin(results, options)
+                self.best, self._values, self._origin = results, self._controller.values(), _origin(results, origin)
             if results.solution_status is SolutionStatus.optimal:
                 return
             self._controller.load(self._values)
@@ -215,11 +216,9 @@ class _Search:
         return "the plan before goes on; " + '; '.join([*found, *late])
 
 
-def _origin(results, options):
+def _origin(results, origin):
     """Where a feasible point comes from; relaxations belong to the full run."""
-    if any(step.kind in ('relaxation', 'restoration') for step in results.extra_info.steps):
-        return FULL
-    return {id(SHIFTED): BRANCH, id(FALL_BACK): SIMULATED}.get(id(options), FULL)
+    return FULL if any(step.kind in ('relaxation', 'restoration') for step in results.extra_info.steps) else origin
 
 
 def _checked(controls, wrt):

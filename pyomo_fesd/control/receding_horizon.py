@@ -28,7 +28,7 @@ def receding_horizon(
     before : callable (number of the step), optional
         called before each step, to change references, bounds or disturbances in either model
     time_limit : float, optional
-        seconds for each step after the first
+        seconds for each step
 
     Returns
     -------
@@ -45,7 +45,7 @@ def receding_horizon(
     for number in range(steps):
         if before is not None:
             before(number)
-        answer = controller.step(plant.measured, plant.modes, time_limit if number else None)
+        answer = controller.step(plant.measured, plant.modes, time_limit)
         rows[plant.time] = answer.row()
         plant.advance(answer.controls)
     return pd.DataFrame.from_dict(rows, orient='index').rename_axis('time')

@@ -4,6 +4,10 @@
 it descends into better branches (``Branches``).
 """
 
+from dataclasses import replace
+
+import numpy as np
+
 from pyomo_fesd.core import DeferredInterrupt, interrupt_handled
 from pyomo_fesd.mpcc.algorithm.branches import Branches
 from pyomo_fesd.mpcc.algorithm.coincidences import Coincidences
@@ -15,6 +19,8 @@ from pyomo_fesd.mpcc.algorithm.search import Verdict
 from pyomo_fesd.mpcc.algorithm.start_points import start_point
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Run, Setup, Stop, Tolerances
 from pyomo_fesd.mpcc.algorithm.subsolves import Subsolves
+from pyomo_fesd.mpcc.nlp import NlpResult
+from pyomo_fesd.mpcc.subproblems import Stationarity
 
 #: Part of the time limit after which a homotopy without a feasible point pauses for a further start.
 PATIENCE = 0.5
@@ -68,6 +74,10 @@ class HybridSolver:
             run.outcome = Outcome.INTERRUPTED
         finally:
             self._c.widen()
+        if run.point is None and self._options.mode == 'hybrid':
+            run.point = self._feasible_without_branch()
+            if run.point is not None and run.outcome is Outcome.INFEASIBLE:
+                run.outcome = Outcome.FEASIBLE
         if run.point is not None:
             run.w = run.point.w
         return run
@@ -139,6 +149,16 @@ class HybridSolver:
         self._branches.explore_from(w, True)
         if self.run.point is None:
             self._path(w, self._branches).follow()
+
+    def _feasible_without_branch(self):
+        """The least infeasible point, as of a simulation, where rows and pairs hold although no branch from there was solved."""
+        if self.run.w is None:
+            return None
+        certificate, f = self._subsolves.measure(self.run.w), self._c.evaluate(self.run.w).f
+        if not certificate.feasible:
+            return None
+        given = NlpResult(self.run.w, f, 'given', 0, np.zeros(0), np.zeros(0))
+        return Point(given, f, replace(certificate, grade=Stationarity.UNTRIED))
 
     def _starts_at_a_solution(self):
         """Whether there is no objective and the start is feasible already."""
