@@ -45,9 +45,9 @@ def transform(m, elements):
     return specify(m)
 
 
-def flowsheet(stages):
-    """Build the exact flowsheet over some control stages, with the rate of the cost."""
-    m = exact(build(times=[k * INTERVAL for k in range(stages + 1)]))
+def flowsheet(stages, how=exact):
+    """Build the flowsheet over some control stages, with the rate of the cost."""
+    m = how(build(times=[k * INTERVAL for k in range(stages + 1)]))
     m.fs.reference = pyo.Param(initialize=REFERENCES[0], mutable=True)
     m.fs.loss = dae.Integral(m.fs.time, rule=stage_cost)
     return m
@@ -80,17 +80,23 @@ def plant():
     return pyomo_fesd.Plant(m, [m.fs.pid.setpoint])
 
 
-def loop(steps=40, seed=0, time_limit=None):
-    """Close the loop; returns plant and the table of steps."""
-    problem, real, chance = control_problem(), plant(), random.Random(seed)
-    controller = pyomo_fesd.Controller(
-        problem, [problem.fs.pid.setpoint], [problem.fs.reference]
-    )
+def control(problem):
+    """Build the controller."""
+    fs = problem.fs
+    return pyomo_fesd.Controller(problem, [fs.pid.setpoint], [fs.reference])
+
+
+def loop(steps=40, seed=0, time_limit=10, build=control_problem, control=control):
+    """Close the loop; returns plant and the table of steps with the cost of each."""
+    problem, real, chance, losses = build(), plant(), random.Random(seed), []
+    controller = control(problem)
 
     def before(number):
         reference = REFERENCES[number // HOLD % len(REFERENCES)]
         problem.fs.reference.set_value(reference)
         real.model.fs.reference.set_value(reference)
+        if number:
+            losses.append(pyo.value(real.model.fs.loss) / INTERVAL)
         if chance.random() < 0.25:
             share = chance.choice(FEEDS)
             for feed in (real.model.fs.mixer.lye, real.model.fs.mixer.ester):
@@ -98,6 +104,7 @@ def loop(steps=40, seed=0, time_limit=None):
                     flow.set_value(share * INFLOW / 2)
 
     table = pyomo_fesd.receding_horizon(controller, real, steps, before, time_limit)
+    table['cost'] = [*losses, pyo.value(real.model.fs.loss) / INTERVAL]
     return real, table
 
 

@@ -22,7 +22,7 @@ import random
 import pyomo.dae as dae
 import pyomo.environ as pyo
 from matplotlib.figure import Figure
-from pyomo.contrib.mpc import IntervalData
+from pyomo.contrib.mpc import DynamicModelInterface, IntervalData
 
 import pyomo_fesd
 from pyomo_fesd.units import relay
@@ -110,20 +110,28 @@ def price(interval):
     return DEAR if interval // HALF_DAY % 2 else CHEAP
 
 
-def loop(steps=48, seed=0, time_limit=None):
-    """Close the loop; returns plant and the table of steps."""
-    problem, real, chance = control_problem(), plant(), random.Random(seed)
-    controller = pyomo_fesd.Controller(problem, [problem.v], [problem.price])
+def control(problem):
+    """Build the controller."""
+    return pyomo_fesd.Controller(problem, [problem.v], [problem.price])
+
+
+def loop(steps=48, seed=0, time_limit=10, build=control_problem, control=control):
+    """Close the loop; returns plant and the table of steps with the cost of each."""
+    problem, real, chance, losses = build(), plant(), random.Random(seed), []
+    controller, interface = control(problem), DynamicModelInterface(problem, problem.t)
     stages = [(k * INTERVAL, (k + 1) * INTERVAL) for k in range(STAGES)]
 
     def before(number):
         prices = [price(number + k) for k in range(STAGES)]
-        controller.interface.load_data(IntervalData({problem.price: prices}, stages))
+        interface.load_data(IntervalData({problem.price: prices}, stages))
+        if number:
+            losses.append(pyo.value(real.model.loss))
         for t in real.model.t:
             real.model.price[t].set_value(prices[0])
         real.model.drawn.set_value(DRAWN * chance.choice((0.3, 0.7, 1.0, 1.3, 1.7)))
 
     table = pyomo_fesd.receding_horizon(controller, real, steps, before, time_limit)
+    table['cost'] = [*losses, pyo.value(real.model.loss)]
     return real, table
 
 

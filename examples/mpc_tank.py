@@ -183,19 +183,23 @@ class Disturbances:
         return self.feeds
 
 
-def loop(steps=60, seed=0, time_limit=None, estimates=True):
-    """Close the loop; returns plant and the table of steps."""
-    problem, real, disturbances = control_problem(), plant(), Disturbances(seed)
-    controller = pyomo_fesd.Controller(
-        problem, [problem.u], [problem.P_ref, problem.F_L, problem.F_G]
-    )
-    estimator = Estimator() if estimates else None
+def control(problem):
+    """Build the controller."""
+    changing = [problem.P_ref, problem.F_L, problem.F_G]
+    return pyomo_fesd.Controller(problem, [problem.u], changing)
+
+
+def loop(steps=60, seed=0, time_limit=None, build=control_problem, control=control):
+    """Close the loop; returns plant and the table of steps with the cost of each."""
+    problem, real, disturbances, losses = build(), plant(), Disturbances(seed), []
+    controller, estimator = control(problem), Estimator()
 
     def before(number):
         reference = REFERENCES[number // HOLD % len(REFERENCES)]
         problem.P_ref.set_value(reference)
         real.model.P_ref.set_value(reference)
-        if estimator is not None and number:
+        if number:
+            losses.append(pyo.value(real.model.loss))
             feeds = estimator(
                 {'M_G': real.model.M_G[0].value, 'M_L': real.model.M_L[0].value},
                 problem.u[INTERVAL].value,
@@ -205,8 +209,9 @@ def loop(steps=60, seed=0, time_limit=None, estimates=True):
         for name, feed in disturbances.next().items():
             real.model.component(name).set_value(feed)
 
-    steps = pyomo_fesd.receding_horizon(controller, real, steps, before, time_limit)
-    return real, steps
+    table = pyomo_fesd.receding_horizon(controller, real, steps, before, time_limit)
+    table['cost'] = [*losses, pyo.value(real.model.loss)]
+    return real, table
 
 
 def draw(real, steps):

@@ -69,7 +69,11 @@ def test_no_file_imports_from_the_package_itself():
 
 def test_public_names():
     assert sorted(pyomo_fesd.__all__) == [
+        'ControlStep',
+        'Controller',
         'FesdError',
+        'MovingModelInterface',
+        'Plant',
         'absolute',
         'at',
         'branch_equations',
@@ -88,6 +92,7 @@ def test_public_names():
         'plot',
         'positive_part',
         'projection',
+        'receding_horizon',
         'recollocate',
         'refine',
         'report',

@@ -23,6 +23,8 @@ ORDER = (
     'gene_network',
     'oscillator',
     'gearbox_car',
+    'mpc_tank',
+    'mpc_heater',
     'projected_ellipse',
     'toy_mpec',
     'idaes_overflow',
@@ -31,6 +33,7 @@ ORDER = (
     'idaes_relief',
     'idaes_boiling',
     'idaes_startup',
+    'idaes_mpc',
 )
 NOT_RUN = """.. image:: /_static/examples/{name}.png
    :alt: picture drawn by {name}.py

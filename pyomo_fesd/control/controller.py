@@ -35,6 +35,8 @@ BRANCH, SIMULATED, FULL, DEADLINE, PLAN = ORIGINS = ('branch', 'simulated branch
 #: Options of the attempts of a step, and where their certified solutions come from unless a homotopy was needed; without a plan
 #: the first attempt is left out.
 ATTEMPTS = ({'warm_start': 'only'}, BRANCH), ({'simulate_first': True}, SIMULATED)
+#: One more attempt of a thorough step.
+HOMOTOPY = ({'simulate_first': False}, FULL)
 #: Seconds left without which no further attempt begins.
 LEAST = 1e-3
 
@@ -112,7 +114,9 @@ class Controller:
         self._solver.set_instance(model, parameters=given, **options)
 
     @interruptible
-    def step(self, measured: Any = None, modes: Iterable = (), time_limit: float | None = None) -> ControlStep:
+    def step(
+        self, measured: Any = None, modes: Iterable = (), time_limit: float | None = None, thorough: bool = False
+    ) -> ControlStep:
         """Shift the plan, load the measurement, solve.
 
         Parameters
@@ -123,6 +127,9 @@ class Controller:
             modes with hysteresis at the first time, as ``load_modes`` takes them
         time_limit : float, optional
             seconds for the whole step
+        thorough : bool
+            make all attempts, and the homotopy, though one is certified before, and keep the best: a certified plan is a local
+            solution, and the shifted one may have become a poor one
 
         Raises
         ------
@@ -136,7 +143,8 @@ class Controller:
             self.interface.load_data(measured, time_points=[self.interface.time.first()])
         self.interface.load_modes(modes)
         search = _Search(self, deadline)
-        search.run(ATTEMPTS if self._has_plan else ATTEMPTS[1:])
+        attempts = ATTEMPTS if self._has_plan else ATTEMPTS[1:]
+        search.run((*attempts, HOMOTOPY) if thorough else attempts, thorough)
         self._has_plan = self._has_plan or search.best is not None
         return search.answer(began, self.present_controls())
 
@@ -177,8 +185,8 @@ class _Search:
         self._plan, self._results, self._late = controller.values(), [], False
         self.best, self._values, self._origin = None, self._plan, PLAN
 
-    def run(self, attempts):
-        """Make attempts until one is certified; the model has the values of the best one, or those of the plan."""
+    def run(self, attempts, all_of_them):
+        """Make attempts until one is certified, or all; the model has the values of the best one, or those of the plan."""
         for options, origin in attempts:
             left = self._deadline.left()
             if left is not None and left < LEAST:
@@ -188,17 +196,16 @@ class _Search:
             self._results.append(results)
             if self._improves(results):
                 self.best, self._values, self._origin = results, self._controller.values(), _origin(results, origin)
-            if results.solution_status is SolutionStatus.optimal:
+            if results.solution_status is SolutionStatus.optimal and not all_of_them:
                 return
             self._controller.load(self._values)
         self._controller.load(self._values)
 
     def _improves(self, results):
-        """Whether this is the first feasible point, or better than the one before."""
+        """Whether this is the first feasible point, or better than the one before: certified before uncertified."""
         if results.solution_status not in (SolutionStatus.optimal, SolutionStatus.feasible):
             return False
-        certified = results.solution_status is SolutionStatus.optimal
-        return self.best is None or certified or results.incumbent_objective < self.best.incumbent_objective
+        return self.best is None or _rank(results) < _rank(self.best)
 
     def answer(self, began, controls) -> ControlStep:
         """The best point as a ``ControlStep``."""
@@ -214,6 +221,10 @@ class _Search:
         found = [f"{r.extra_info.outcome}: {r.extra_info.reason}" for r in self._results[-1:]]
         late = ["no time was left"] if self._late else []
         return "the plan before goes on; " + '; '.join([*found, *late])
+
+
+def _rank(results):
+    return results.solution_status is not SolutionStatus.optimal, results.incumbent_objective
 
 
 def _origin(results, origin):

@@ -4,7 +4,6 @@ from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Var
 from pyomo.core.base.var import VarData
 from pyomo.dae import ContinuousSet
-from pyomo.gdp import Disjunct
 
 from pyomo_fesd.core import TimeIndex, all_switched_systems
 
@@ -14,10 +13,8 @@ def first_states(model: Block, wrt: ContinuousSet) -> list[VarData]:
 
     Multipliers of modes are not among them (``FirstModes``).
     """
-    selectors = ComponentSet(
-        v for s in all_switched_systems(model).selectors for v in (s.values() if s.is_indexed() else [s])
-    )
-    variables = model.component_data_objects(Var, descend_into=(Block, Disjunct))
+    selectors = ComponentSet(v for s in all_switched_systems(model).selectors for v in (s.values() if s.is_indexed() else [s]))
+    variables = model.component_data_objects(Var, descend_into=Block)
     found = []
     for by_label in TimeIndex(wrt).families(variables).values():
         first, last = by_label.get(wrt.first()), by_label.get(wrt.last())

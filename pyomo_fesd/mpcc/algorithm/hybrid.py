@@ -151,7 +151,7 @@ class HybridSolver:
             self._path(w, self._branches).follow()
 
     def _feasible_without_branch(self):
-        """The least infeasible point, as of a simulation, where rows and pairs hold although no branch from there was solved."""
+        """The least infeasible point, perhaps the start, where rows and pairs hold although no branch from there was solved."""
         if self.run.w is None:
             return None
         certificate, f = self._subsolves.measure(self.run.w), self._c.evaluate(self.run.w).f
