@@ -5,7 +5,8 @@ Predictive control of a tank with a switching outlet
 A closed tank with feeds of liquid and gas has one outlet: liquid leaves while the level
 is above it, gas while it is below, and where neither mode alone can hold the level it
 slides at the outlet. The controller sets the opening of the valve every two seconds so
-that the pressure follows a reference. The plant is not the model: its valve is smaller
+that the pressure follows a reference; where the objective of a plan rises, it looks
+for another local solution. The plant is not the model: its valve is smaller
 and its feeds jump at times that nobody foresees, so the outlet changes its mode at such
 times too. A moving-horizon estimator finds the present feeds from the last four
 intervals, with the same switching model. The simulated plant has the right answer by
@@ -106,7 +107,7 @@ def stage_cost(m, t):
 
 
 def plant():
-    """Build the plant over one interval; its valve is smaller than that of the model."""
+    """Build the plant over one interval; its valve is smaller than in the model."""
     m = build(1, VALVE)
     m.loss = dae.Integral(m.t, rule=stage_cost)
     return pyomo_fesd.Plant(transform(m, 20), [m.u])
@@ -142,9 +143,7 @@ class Estimator:
         transform(m)
         self._interface = pyomo_fesd.MovingModelInterface(m)
         self._solver = pyo.SolverFactory('mpec_hybrid')
-        self._solver.set_instance(
-            m, parameters=[m.u, m.seen, m.M_G[0], m.M_L[0]]
-        )
+        self._solver.set_instance(m, parameters=[m.u, m.seen, m.M_G[0], m.M_L[0]])
         self.past = [(start, U_REF)]
 
     def __call__(self, states, control):
@@ -154,7 +153,10 @@ class Estimator:
         if len(self.past) <= PAST:
             return FEEDS
         self._interface.shift_values_by_time()
-        controls, between = [u for _, u in self.past[1:]], zip(self._ends, self._ends[1:])
+        controls, between = (
+            [u for _, u in self.past[1:]],
+            zip(self._ends, self._ends[1:]),
+        )
         self._interface.load_data(IntervalData({m.u: controls}, list(between)))
         for k, (states, _) in enumerate(self.past):
             for name, amount in states.items():
@@ -186,7 +188,7 @@ class Disturbances:
 def control(problem):
     """Build the controller."""
     changing = [problem.P_ref, problem.F_L, problem.F_G]
-    return pyomo_fesd.Controller(problem, [problem.u], changing)
+    return pyomo_fesd.Controller(problem, [problem.u], changing, rise=0.1)
 
 
 def loop(steps=60, seed=0, time_limit=None, build=control_problem, control=control):

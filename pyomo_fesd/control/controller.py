@@ -21,7 +21,7 @@ from typing import Any
 from pyomo.contrib.mpc import ScalarData
 from pyomo.contrib.solver.common.factory import SolverFactory
 from pyomo.contrib.solver.common.results import SolutionStatus
-from pyomo.core import Block, Var
+from pyomo.core import Block, Objective, Var
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct
 
@@ -92,6 +92,9 @@ class Controller:
         fixed variables and mutable Params whose values may change besides the states and modes at the first time: references,
         prices, disturbances; bounds of variables may change as well
     wrt : ContinuousSet, optional
+    rise : float, optional
+        where the objective of a new plan is above that of the plan before by more than this part, the homotopy is tried as well,
+        and the better one kept: the shifted branch may hold a local solution that a disturbance has made poor
     options : options of ``mpec_hybrid`` for every solve
 
     Attributes
@@ -105,10 +108,20 @@ class Controller:
         as ``set_instance`` and ``MovingModelInterface``, and for controls that are not variables over time
     """
 
-    def __init__(self, model: Block, controls: Sequence[Var], parameters: Iterable = (), wrt: ContinuousSet | None = None, **options):
+    def __init__(
+        self,
+        model: Block,
+        controls: Sequence[Var],
+        parameters: Iterable = (),
+        wrt: ContinuousSet | None = None,
+        rise: float | None = None,
+        **options,
+    ):
         self.interface = MovingModelInterface(model, wrt)
-        self._model, self._controls, self._options = model, _checked(controls, self.interface.time), {'review': False} | options
+        self._model, self._controls = model, _checked(controls, self.interface.time)
+        self._options = {'review': False} | options
         self._solver, self._has_plan = SolverFactory('mpec_hybrid'), False
+        self._rise, self._objective = rise, None
         self._variables = list(model.component_data_objects(Var, descend_into=(Block, Disjunct)))
         given = [*first_states(model, self.interface.time), *self.interface.mode_multipliers, *parameters]
         self._solver.set_instance(model, parameters=given, **options)
@@ -143,9 +156,11 @@ class Controller:
             self.interface.load_data(measured, time_points=[self.interface.time.first()])
         self.interface.load_modes(modes)
         search = _Search(self, deadline)
-        attempts = ATTEMPTS if self._has_plan else ATTEMPTS[1:]
-        search.run((*attempts, HOMOTOPY) if thorough else attempts, thorough)
+        search.run(ATTEMPTS if self._has_plan else ATTEMPTS[1:], thorough)
+        if thorough or self._has_risen(search.best):
+            search.run([HOMOTOPY], True)
         self._has_plan = self._has_plan or search.best is not None
+        self._objective = None if search.best is None else search.best.incumbent_objective
         return search.answer(began, self.present_controls())
 
     def present_controls(self) -> ScalarData:
@@ -153,7 +168,18 @@ class Controller:
         last = self.interface.moving.grid.elements[0].points[-1]
         return ScalarData({u: _within_bounds(u[last]) for u in self._controls}, time_set=self.interface.time)
 
+    def _has_risen(self, best):
+        """Whether the objective is above that of the step before by more than ``rise``; one that is maximised is below it."""
+        if best is None or self._rise is None or self._objective is None:
+            return False
+        return self.sense * (best.incumbent_objective - self._objective) > self._rise * abs(self._objective)
+
     # called by the search
+
+    @property
+    def sense(self) -> int:
+        """1 where the objective is minimised, -1 where it is maximised."""
+        return int(next(self._model.component_data_objects(Objective, active=True)).sense)
 
     def solve(self, options: dict, time_limit: float | None):
         """Solve from the present values; returns Pyomo's results."""
@@ -205,7 +231,11 @@ class _Search:
         """Whether this is the first feasible point, or better than the one before: certified before uncertified."""
         if results.solution_status not in (SolutionStatus.optimal, SolutionStatus.feasible):
             return False
-        return self.best is None or _rank(results) < _rank(self.best)
+        return self.best is None or self._rank(results) < self._rank(self.best)
+
+    def _rank(self, results):
+        sense = self._controller.sense
+        return results.solution_status is not SolutionStatus.optimal, sense * results.incumbent_objective
 
     def answer(self, began, controls) -> ControlStep:
         """The best point as a ``ControlStep``."""
@@ -221,10 +251,6 @@ class _Search:
         found = [f"{r.extra_info.outcome}: {r.extra_info.reason}" for r in self._results[-1:]]
         late = ["no time was left"] if self._late else []
         return "the plan before goes on; " + '; '.join([*found, *late])
-
-
-def _rank(results):
-    return results.solution_status is not SolutionStatus.optimal, results.incumbent_objective
 
 
 def _origin(results, origin):

@@ -56,7 +56,9 @@ class FirstModes:
                 known = ', '.join(f"'{known}'" for known in self._systems) or "none"
                 raise FesdError(name, "load_modes: not a mode with hysteresis", f"modes with hysteresis of this model: {known}")
             if active.setdefault(self._systems[name], name) != name:
-                raise FesdError(name, f"load_modes: '{active[self._systems[name]]}', of the same Disjunction, is given too", "give one")
+                raise FesdError(
+                    name, f"load_modes: '{active[self._systems[name]]}', of the same Disjunction, is given too", "give one"
+                )
         chosen = [
             (weight.expr, float(mode in active.values()))
             for mode, weights in self._weights.items()

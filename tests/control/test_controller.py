@@ -30,7 +30,14 @@ def solved_anew(x, goal, bound=2.0):
 def test_plans_are_simulations_of_their_controls_while_references_bounds_and_states_change(controller):
     m = controller._model
     origins = []
-    for x, goal, bound in ((-1.0, 0.5, 2.0), (-0.6, 0.5, 2.0), (-0.2, 0.5, 1.5), (0.0, 0.7, 1.5), (0.3, -0.5, 1.5), (-0.1, -0.5, 2.0)):
+    for x, goal, bound in (
+        (-1.0, 0.5, 2.0),
+        (-0.6, 0.5, 2.0),
+        (-0.2, 0.5, 1.5),
+        (0.0, 0.7, 1.5),
+        (0.3, -0.5, 1.5),
+        (-0.1, -0.5, 2.0),
+    ):
         m.goal = goal
         m.u.setub(bound)
         answer = controller.step({'x[*]': x}, time_limit=20)

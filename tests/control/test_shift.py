@@ -1,9 +1,9 @@
 """Values that move on with the horizon: on physical time, with all that belongs to elements, and only where stages are alike."""
 
+import bouncing_ball
 import numpy as np
 import pyomo.environ as pyo
 import pytest
-import bouncing_ball
 
 import pyomo_fesd
 from pyomo_fesd import FesdError, MovingModelInterface

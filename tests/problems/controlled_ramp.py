@@ -1,4 +1,4 @@
-"""Control of a ramp with a kink, dx/dt = u below zero and u - 1/2 above, on equal control stages: minimise int (x - goal)^2 + u^2 / 10.
+"""Control of a ramp with a kink, dx/dt = u below zero and u - 1/2 above, on equal control stages; cost (x - goal)^2 + u^2 / 10.
 
 ``relay=True`` adds a heater with hysteresis: dy/dt = 2 - y while on, until y >= 1.2, and -y while off, until y <= 0.8.
 """

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 
 from benchmarks.profile.clock import NlpClock
 
-
 SEED = 1
 #: Seconds that a step of this package may take, by plant.
 DEADLINES = {'tank': 10.0, 'heater': 15.0, 'idaes': 30.0}
@@ -88,5 +87,3 @@ def _nosnoc(plant, example):
     from benchmarks.mpc.nosnoc_peer import NosnocControl
 
     return {'control': NosnocControl}
-
-

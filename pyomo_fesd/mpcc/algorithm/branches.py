@@ -91,7 +91,7 @@ class Branches:
         self.improve_from(self._point(w, self._subsolves.sets(w, self._tolerances.biactive).zero, None, final), final)
 
     def explore_decided(self, w) -> bool:
-        """Solve the branch that ``w`` names at once with the decisions that ``w`` asks for (eq. 13); return whether that settles it.
+        """Solve the branch that ``w`` names with the decisions that ``w`` asks for (eq. 13); return whether that settles it.
 
         It does where the solution is certified and asks for the same decisions: then the NLP that finds eta would change nothing.
         """
