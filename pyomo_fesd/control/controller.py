@@ -15,7 +15,6 @@ Does not apply: to controls that are not held on control stages.
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 from pyomo.contrib.mpc import ScalarData
@@ -25,13 +24,12 @@ from pyomo.core import Block, Objective, Var
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct
 
+from pyomo_fesd.control.control_step import BRANCH, DEADLINE, FULL, PLAN, SIMULATED, ControlStep
 from pyomo_fesd.control.moving_interface import MovingModelInterface
 from pyomo_fesd.control.states import first_states
-from pyomo_fesd.core import FesdError, interruptible, is_indexed_by, strip_time
+from pyomo_fesd.core import FesdError, interruptible, is_indexed_by
 from pyomo_fesd.mpcc import Deadline
 
-#: Where an answer comes from.
-BRANCH, SIMULATED, FULL, DEADLINE, PLAN = ORIGINS = ('branch', 'simulated branch', 'full run', 'deadline', 'plan')
 #: Options of the attempts of a step, and where their certified solutions come from unless a homotopy was needed; without a plan
 #: the first attempt is left out.
 ATTEMPTS = ({'warm_start': 'only'}, BRANCH), ({'simulate_first': True}, SIMULATED)
@@ -39,43 +37,6 @@ ATTEMPTS = ({'warm_start': 'only'}, BRANCH), ({'simulate_first': True}, SIMULATE
 HOMOTOPY = ({'simulate_first': False}, FULL)
 #: Seconds left without which no further attempt begins.
 LEAST = 1e-3
-
-
-@dataclass(frozen=True)
-class ControlStep:
-    """The answer of one step.
-
-    Attributes
-    ----------
-    controls : ScalarData
-        of the first control stage; ``load_data`` of the plant's interface takes it
-    origin : str
-        'branch': certified, in the branch of the shifted plan or one that descends from it; 'simulated branch': certified, in the
-        branch of a simulation; 'full run': of the homotopy; 'deadline': the best feasible point at the deadline; 'plan': no
-        feasible point was found, and the plan of the step before goes on
-    certified : bool
-    reason : str
-        the certificate, or why there is none
-    objective : float or None
-        of the new plan; None with the origin 'plan'
-    seconds : float
-        of the whole step
-    results : list of Results
-        of its solves, see ``mpec_hybrid``
-    """
-
-    controls: ScalarData
-    origin: str
-    certified: bool
-    reason: str
-    objective: float | None
-    seconds: float
-    results: list = field(repr=False, default_factory=list)
-
-    def row(self) -> dict:
-        """Return everything but the results as a row of a table, with the controls by name."""
-        kept = {name: getattr(self, name) for name in ('origin', 'certified', 'reason', 'objective', 'seconds')}
-        return kept | {strip_time(str(name)): number for name, number in self.controls.get_data().items()}
 
 
 class Controller:
@@ -149,7 +110,18 @@ class Controller:
         FesdError
             for data that the model does not have, and for changes of the model that are not listed in ``parameters``
         """
-        began, deadline = time.perf_counter(), Deadline.after(time_limit)
+        began, deadline, before = time.perf_counter(), Deadline.after(time_limit), self.values()
+        try:
+            search = self._searched(measured, modes, deadline, thorough)
+        except Exception:
+            self.load(before)
+            raise
+        self._has_plan = self._has_plan or search.best is not None
+        self._objective = None if search.best is None else search.best.incumbent_objective
+        return search.answer(began, self.present_controls())
+
+    def _searched(self, measured, modes, deadline, thorough):
+        """The ``_Search`` of one step."""
         if self._has_plan:
             self.interface.shift_values_by_time()
         if measured is not None:
@@ -159,9 +131,7 @@ class Controller:
         search.run(ATTEMPTS if self._has_plan else ATTEMPTS[1:], thorough)
         if thorough or self._has_risen(search.best):
             search.run([HOMOTOPY], True)
-        self._has_plan = self._has_plan or search.best is not None
-        self._objective = None if search.best is None else search.best.incumbent_objective
-        return search.answer(began, self.present_controls())
+        return search
 
     def present_controls(self) -> ScalarData:
         """Return the controls of the first control stage that the model has now, within their bounds."""

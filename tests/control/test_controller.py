@@ -43,7 +43,7 @@ def test_plans_are_simulations_of_their_controls_while_references_bounds_and_sta
         answer = controller.step({'x[*]': x}, time_limit=20)
         origins.append(answer.origin)
         assert answer.origin != 'plan' and max(v.value for v in m.u.values()) <= bound + 1e-9
-        assert answer.controls.get_data_from_key(m.u) == m.u[0.5].value and m.x[0].value == x
+        assert answer.controls.get_data_from_key(m.u) == pytest.approx(m.u[0.5].value) and m.x[0].value == x
         other = controlled_ramp.control_problem()
         other.x[0].fix(x)
         for t in (0.5, 1.0, 1.5, 2.0):
@@ -107,8 +107,19 @@ def test_a_parameter_that_is_not_listed_is_named():
     controller = Controller(m, [m.u])
     controller.step()
     m.goal = 0.8
+    before = [v.value for v in m.component_data_objects(pyo.Var)]
     with pytest.raises(FesdError, match="goal.*was compiled into the model"):
         controller.step({'x[*]': -0.5})
+    assert [v.value for v in m.component_data_objects(pyo.Var)] == before
+
+
+def test_a_plan_whose_objective_rises_is_compared_with_the_homotopy():
+    m = controlled_ramp.control_problem()
+    controller = Controller(m, [m.u], rise=0.1)
+    controller.step({'x[*]': 0.0})
+    answer = controller.step({'x[*]': -1.0}, time_limit=60)
+    assert any(step.kind == 'relaxation' for results in answer.results for step in results.extra_info.steps)
+    assert answer.certified and answer.objective <= solved_anew(-1.0, 0.5) + 1e-6
 
 
 def test_controls_must_be_variables_over_time():

@@ -1,8 +1,8 @@
 """The interface for data of a moving model: Pyomo's, with intervals of whole control stages only."""
 
+import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
-import signum
 from pyomo.contrib.mpc import IntervalData
 
 from pyomo_fesd import FesdError, MovingModelInterface
@@ -27,7 +27,10 @@ def test_an_interval_that_ends_where_elements_move_is_refused():
 
 
 def test_a_model_without_a_moving_grid_is_refused():
-    m = signum.build()
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 1))
+    m.x = pyo.Var(m.t)
+    m.dx = dae.DerivativeVar(m.x)
     pyo.TransformationFactory('dae.collocation').apply_to(m, wrt=m.t, nfe=3)
     with pytest.raises(FesdError, match='elements are not movable'):
         MovingModelInterface(m)

@@ -9,7 +9,7 @@ from tests.problems import controlled_ramp
 
 def test_the_loop_reaches_its_goal_despite_of_mismatch_and_a_changing_reference():
     problem, real = controlled_ramp.control_problem(), controlled_ramp.build(stages=1, elements=6, drift=0.1)
-    controller, plant = Controller(problem, [problem.u], [problem.goal]), Plant(real, [real.u])
+    controller, plant = Controller(problem, [problem.u], [problem.goal], rise=0.1), Plant(real, [real.u])
 
     def before(number):
         problem.goal = 0.5 if number < 6 else -0.5
