@@ -15,6 +15,7 @@ from pyomo.core import TransformationFactory
 if TYPE_CHECKING:  # the same names as in _ROOMS, for editors and type checkers
     from pyomo_fesd import units
     from pyomo_fesd.analysis import branch_equations, report, structure
+    from pyomo_fesd.control import Controller, ControlStep, MovingModelInterface, Plant, receding_horizon
     from pyomo_fesd.core import FesdError, __version__
     from pyomo_fesd.estimation import at, parmest_solver
     from pyomo_fesd.finite_elements import recollocate
@@ -41,7 +42,11 @@ if TYPE_CHECKING:  # the same names as in _ROOMS, for editors and type checkers
     from pyomo_fesd.starts import start_from
 
 __all__ = [
+    'ControlStep',
+    'Controller',
     'FesdError',
+    'MovingModelInterface',
+    'Plant',
     'absolute',
     'at',
     'branch_equations',
@@ -61,6 +66,7 @@ __all__ = [
     'plot',
     'positive_part',
     'projection',
+    'receding_horizon',
     'recollocate',
     'refine',
     'report',
@@ -80,6 +86,7 @@ __all__ = [
 #: Room -> the public names that it defines.
 _ROOMS = {
     'analysis': ('branch_equations', 'report', 'structure'),
+    'control': ('ControlStep', 'Controller', 'MovingModelInterface', 'Plant', 'receding_horizon'),
     'core': ('FesdError', '__version__'),
     'estimation': ('at', 'parmest_solver'),
     'finite_elements': ('recollocate',),

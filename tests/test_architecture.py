@@ -17,7 +17,7 @@ FLOORS = (
     ('solvers',),
     ('simulation',),
     ('starts', 'sensitivities', 'scenarios', 'integers'),
-    ('refinement',),
+    ('refinement', 'control'),
 )
 #: The rooms inside a room, each importing only from those before it.
 INNER = {
@@ -69,7 +69,11 @@ def test_no_file_imports_from_the_package_itself():
 
 def test_public_names():
     assert sorted(pyomo_fesd.__all__) == [
+        'ControlStep',
+        'Controller',
         'FesdError',
+        'MovingModelInterface',
+        'Plant',
         'absolute',
         'at',
         'branch_equations',
@@ -89,6 +93,7 @@ def test_public_names():
         'plot',
         'positive_part',
         'projection',
+        'receding_horizon',
         'recollocate',
         'refine',
         'report',

@@ -33,6 +33,7 @@ RADAU, LEGENDRE = 'LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE'
         ('bouncing_ball', 'q(3 s) = 0.5386263507 m'),
         ('batch_reactor', 'Product: 106.495000 mol'),
         ('gearbox_car', 'ten equal stages: T = 10.229257'),
+        ('mpc_tank', 'branch'),
         ('gene_network', 'gene 1 is expressed for 0.900000'),
     ],
 )

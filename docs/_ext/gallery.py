@@ -23,6 +23,8 @@ ORDER = (
     'gene_network',
     'oscillator',
     'gearbox_car',
+    'mpc_tank',
+    'mpc_heater',
     'projected_ellipse',
     'toy_mpec',
     'pump_schedule',
@@ -33,6 +35,7 @@ ORDER = (
     'idaes_relief',
     'idaes_boiling',
     'idaes_startup',
+    'idaes_mpc',
 )
 NOT_RUN = """.. image:: /_static/examples/{name}.png
    :alt: picture drawn by {name}.py
@@ -50,6 +53,7 @@ SECONDS = {
     'idaes_relief': 16,
     'idaes_boiling': 14,
     'idaes_startup': 36,
+    'idaes_mpc': 200,
 }
 CODE = '.. code-block:: Python\n'
 

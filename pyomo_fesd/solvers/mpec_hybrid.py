@@ -144,9 +144,9 @@ class MpecHybrid(CasadiSolver):
             table.end(results)
         self._refuse_nonoptimal(results, f"{results.extra_info.outcome}. {results.extra_info.reason}")
         if loaded:
-            feasible = results.solution_status in (SolutionStatus.optimal, SolutionStatus.feasible)
+            wanted = config.review and results.solution_status in (SolutionStatus.optimal, SolutionStatus.feasible)
             with phase(config.timer, 'review'), PauseGC():
-                found = review(lambda: self._review(model, record), lambda failure: [failure]) if feasible else []
+                found = review(lambda: self._review(model, record), lambda failure: [failure]) if wanted else []
             results.extra_info.warnings = found
         return results
 

@@ -64,9 +64,10 @@ OPTIONS = (
     (
         'warm_start',
         False,
-        Bool,
+        In([True, False, 'only']),
         "begin at the branch that the values in the model name; if its solution is certified, the run ends there, at the local "
-        "solution next to the start, without a homotopy; of several starts this applies to the first one",
+        "solution next to the start, without a homotopy; of several starts this applies to the first one; with 'only' the run "
+        "ends there in any case",
     ),
     (
         'simulate_first',
@@ -136,6 +137,7 @@ OPTIONS = (
         "values), 'coefficients' (of linear terms, and bounds), 'auto' (start values on a moving grid, coefficients of linear "
         "and of small MPCCs), 'user' (nothing is scaled, nor is a small or huge objective and its offset)",
     ),
+    ('review', True, Bool, "check the solution on moving elements afterwards (``results.extra_info.warnings``)"),
     (
         'callback',
         None,

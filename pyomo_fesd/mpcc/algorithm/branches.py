@@ -90,6 +90,22 @@ class Branches:
         """Solve the branch that the values ``w`` name."""
         self.improve_from(self._point(w, self._subsolves.sets(w, self._tolerances.biactive).zero, None, final), final)
 
+    def explore_decided(self, w) -> bool:
+        """Solve the branch that ``w`` names with the decisions that ``w`` asks for (eq. 13); return whether that settles it.
+
+        It does where the solution is certified and asks for the same decisions: then the NLP that finds eta would change nothing.
+        """
+        if not self._c.eta.numel():
+            return False
+        zero = self._subsolves.sets(w, self._tolerances.biactive).zero
+        result, equal = self._imposed(w, zero, True, self._subsolves.branch, max_iter=FIRST)
+        if result is None or not result.solved or np.any((self._c.evaluate(result.w).eta > self._tolerances.eta) != equal):
+            return False
+        certificate = self._subsolves.certify(result, equal)
+        if certificate.certified:
+            self.improve_from(Point(result, self._c.evaluate(result.w).f, certificate, equal), False)
+        return certificate.certified
+
     def try_neighbours(self):
         """Solve the neighbouring branches of the incumbent, and those of each better point found."""
         neighbours = list(self._c.neighbours)

@@ -4,6 +4,10 @@
 it descends into better branches (``Branches``).
 """
 
+from dataclasses import replace
+
+import numpy as np
+
 from pyomo_fesd.core import DeferredInterrupt, interrupt_handled
 from pyomo_fesd.mpcc.algorithm.branches import Branches
 from pyomo_fesd.mpcc.algorithm.coincidences import Coincidences
@@ -15,11 +19,15 @@ from pyomo_fesd.mpcc.algorithm.search import Verdict
 from pyomo_fesd.mpcc.algorithm.start_points import start_point
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Run, Setup, Stop, Tolerances
 from pyomo_fesd.mpcc.algorithm.subsolves import Subsolves
+from pyomo_fesd.mpcc.nlp import NlpResult
+from pyomo_fesd.mpcc.subproblems import Stationarity
 
 #: Part of the time limit after which a homotopy without a feasible point pauses for a further start.
 PATIENCE = 0.5
 #: Other starts of a problem with few pairs, before it is called infeasible.
 RESTARTS = 3
+#: Value of the option ``warm_start`` with which the run ends at the branch of the start values.
+ONLY = 'only'
 #: Times that a better order of changes is made even again.
 ROUNDS = 3
 
@@ -66,6 +74,10 @@ class HybridSolver:
             run.outcome = Outcome.INTERRUPTED
         finally:
             self._c.widen()
+        if run.point is None and self._options.mode == 'hybrid':
+            run.point = self._feasible_without_branch()
+            if run.point is not None and run.outcome is Outcome.INFEASIBLE:
+                run.outcome = Outcome.FEASIBLE
         if run.point is not None:
             run.w = run.point.w
         return run
@@ -79,7 +91,10 @@ class HybridSolver:
         """The whole algorithm."""
         if self._starts_at_a_solution():
             return Outcome.SOLVED
-        if not (self._options.warm_start and self._from_values()):
+        certified = bool(self._options.warm_start) and self._from_values()
+        if not certified and self._options.warm_start == ONLY:
+            return Outcome.NO_BRANCH if self.run.point is None else Outcome.FEASIBLE
+        if not certified:
             self._complete()
             if self.run.point is None:
                 self._follow_path()
@@ -135,6 +150,16 @@ class HybridSolver:
         if self.run.point is None:
             self._path(w, self._branches).follow()
 
+    def _feasible_without_branch(self):
+        """The least infeasible point, perhaps the start, where rows and pairs hold although no branch from there was solved."""
+        if self.run.w is None:
+            return None
+        certificate, f = self._subsolves.measure(self.run.w), self._c.evaluate(self.run.w).f
+        if not certificate.feasible:
+            return None
+        given = NlpResult(self.run.w, f, 'given', 0, np.zeros(0), np.zeros(0))
+        return Point(given, f, replace(certificate, grade=Stationarity.UNTRIED))
+
     def _starts_at_a_solution(self):
         """Whether there is no objective and the start is feasible already."""
         if self._c.has_objective:
@@ -168,7 +193,8 @@ class HybridSolver:
     def _from_values(self):
         """Whether the branch that the start values name leads to a certified point."""
         self._subsolves.keep_least_infeasible(self._c.x0)
-        self._branches.explore_from(self._c.x0, False)
+        if not self._branches.explore_decided(self._c.x0):
+            self._branches.explore_from(self._c.x0, False)
         return self.run.point is not None and self.run.point.certificate.certified
 
     def _start_is_better(self):

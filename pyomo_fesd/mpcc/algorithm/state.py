@@ -14,6 +14,7 @@ class Outcome(Enum):
     SOLVED = "exactly complementary solution found; there is no objective to minimise"
     RELAXED = "relaxation solved down to the last eps; nothing is certified"
     FEASIBLE = "feasible, exactly complementary point found, not certified"
+    NO_BRANCH = "the branch of the start values has no feasible point; no other was looked for (warm_start='only')"
     INFEASIBLE = "no feasible point found: the problem is locally infeasible"
     UNBOUNDED = "the objective falls without bound along feasible points"
     TIME_LIMIT = "time limit reached"

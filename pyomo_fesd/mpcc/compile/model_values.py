@@ -87,9 +87,18 @@ def stated_bounds(variables):
 
 def start_values(variables):
     """The variables' values, 0 where one is missing (or not a finite number), and the number of missing values."""
-    start = np.array([start_value(v.value) for v in variables], dtype=float)
+    start = _numbers([v.value for v in variables])
     known = np.isfinite(start)
     return np.where(known, start, 0.0), int(np.count_nonzero(~known))
+
+
+def _numbers(values):
+    """An array with nan for what is no number; one by one only where numpy cannot read them at once."""
+    try:
+        found = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    return found if found.shape == (len(values),) else np.array([start_value(v) for v in values], dtype=float)
 
 
 def start_value(now):

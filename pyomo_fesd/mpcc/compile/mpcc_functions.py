@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from pyomo_fesd.mpcc.compile.derivatives import ModelDerivatives
+from pyomo_fesd.mpcc.compile.last_points import LastPoints
 
 
 @dataclass(frozen=True)
@@ -232,6 +233,7 @@ class MpccFunctions:
         self.kind, self.pairs, self.inner = functions.kind, functions.pairs, 2 * functions.pairs + functions.decisions
         self.x, self.p = self.kind.sym('w', len(self.x0)), self.kind.sym('p', len(self.parameters))
         self.__dict__.update(functions.outputs(self.x, self.p))
+        self._evaluated, self._differentiated = LastPoints(self._evaluate), LastPoints(self._gradients)
 
     def at(self, w, p) -> ModelDerivatives:
         """Return the functions and their derivatives at expressions ``w`` and ``p``."""
@@ -314,8 +316,11 @@ class MpccFunctions:
 
     def evaluate(self, w) -> Evaluation:
         """f, g, G, H and eta at ``w``."""
-        f, g, G, H, eta = (np.asarray(v, dtype=float).ravel() for v in self._values(w, self.parameters))
-        return Evaluation(float(f[0]), g, G, H, eta)
+        return self._evaluated(w, self.parameters)
+
+    def _evaluate(self, w, parameters):
+        f, *others = (_read_only(v.full().ravel()) for v in self._values(w, parameters))
+        return Evaluation(float(f[0]), *others)
 
     def decided(self, w):
         """The residuals of the decisions' equations at ``w``."""
@@ -327,10 +332,12 @@ class MpccFunctions:
 
     def gradients(self, w):
         """Gradient of f (array) and Jacobians of g, G, H and the decisions' equations (scipy csr) at ``w``."""
+        return self._differentiated(w, self.parameters)
+
+    def _gradients(self, w, parameters):
         function, patterns = self._jacobian
-        numbers = (np.asarray(v, dtype=float).ravel() for v in function(w, self.parameters))
-        grad, *jacobians = (pattern.with_numbers(v) for pattern, v in zip(patterns, numbers))
-        return grad.toarray().ravel(), *jacobians
+        grad, *jacobians = (pattern.with_numbers(v.full().ravel()) for pattern, v in zip(patterns, function(w, parameters)))
+        return _read_only(grad.toarray().ravel()), *jacobians
 
     def violations(self, w, at=None):
         """How much each row (m) and each bound (n) is violated at ``w``."""
@@ -353,6 +360,12 @@ class MpccFunctions:
     def absolute(self, rows, bounds, sides):
         """Violations of rows (m) and bounds (n) and values of sides (2q) in the model's units."""
         return rows / self.scale.g, bounds / self.scale.x, sides / self.scale.sides
+
+
+def _read_only(numbers):
+    """An array that several callers may share."""
+    numbers.flags.writeable = False
+    return numbers
 
 
 class _Pattern:

@@ -8,6 +8,7 @@ from pyomo.common.collections import ComponentMap
 from pyomo.contrib.solver.common.results import SolutionStatus, TerminationCondition
 from pyomo.contrib.solver.common.solution_loader import SolutionLoader
 from pyomo.contrib.solver.common.util import NoDualsError, NoReducedCostsError, NoSolutionError
+from pyomo.core.staleflag import StaleFlagManager
 
 from pyomo_fesd.mpcc.algorithm import Outcome
 
@@ -18,6 +19,7 @@ CONDITIONS = {
     Outcome.FEASIBLE: (TerminationCondition.unknown, SolutionStatus.feasible),
     Outcome.RELAXED: (TerminationCondition.unknown, SolutionStatus.unknown),
     Outcome.INFEASIBLE: (TerminationCondition.locallyInfeasible, SolutionStatus.infeasible),
+    Outcome.NO_BRANCH: (TerminationCondition.unknown, SolutionStatus.unknown),
     Outcome.UNBOUNDED: (TerminationCondition.unbounded, SolutionStatus.unknown),
     Outcome.TIME_LIMIT: (TerminationCondition.maxTimeLimit, SolutionStatus.unknown),
     Outcome.ITERATION_LIMIT: (TerminationCondition.iterationLimit, SolutionStatus.unknown),
@@ -25,7 +27,7 @@ CONDITIONS = {
     Outcome.STOPPED: (TerminationCondition.interrupted, SolutionStatus.unknown),
 }
 #: Outcomes whose least infeasible point shows what is wrong, unless there is a feasible one.
-WITHOUT_POINT = (Outcome.INFEASIBLE, Outcome.TIME_LIMIT, Outcome.ITERATION_LIMIT)
+WITHOUT_POINT = (Outcome.NO_BRANCH, Outcome.INFEASIBLE, Outcome.TIME_LIMIT, Outcome.ITERATION_LIMIT)
 #: Measures of a certificate, None without one.
 MEASURES = ('violation', 'complementarity', 'violation_scaled', 'complementarity_scaled')
 #: Number of violated pairs and rows that a report names.
@@ -151,7 +153,12 @@ class Loader(SolutionLoader):
             pass
 
     def load_vars(self, vars_to_load=None):
-        super().load_vars(vars_to_load)
+        if vars_to_load is None and self._w is not None:
+            for v, number in zip(self._c.variables, self._w.tolist()):
+                v.set_value(number, skip_validation=True)
+            StaleFlagManager.mark_all_as_stale(delayed=True)
+        else:
+            super().load_vars(vars_to_load)
         self._loaded(self._pyomo_model)
 
 

@@ -138,7 +138,7 @@ class Lpec:
             step = np.where(within[0], step, np.where(within[1], -step, 0.0))
             there = self._c.gradients(w + step)
             cost = np.nan_to_num((there[0] - here[0]) / DISPLACEMENT, posinf=0.0, neginf=0.0)
-            A = sparse.vstack([b - a for a, b in zip(_blocks(here, sets, equal), _blocks(there, sets, equal))]).tocsr()
+            A = sparse.vstack(_blocks([b - a for a, b in zip(here, there)], sets, equal)).tocsr()
             A.data = np.nan_to_num(A.data / DISPLACEMENT, posinf=0.0, neginf=0.0)
             changes.append((cost, A))
         return changes

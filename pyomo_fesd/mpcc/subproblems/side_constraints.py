@@ -23,7 +23,7 @@ TIE = 1e-7
 OPEN = 1e-3
 
 
-@dataclass(frozen=True)
+@dataclass
 class Sides:
     """Sides G (first q) and H (last q) of a compiled MPCC, index k = side * q + pair.
 
@@ -66,11 +66,13 @@ class Sides:
         return low, high
 
     def same_rows(self, other):
-        """Whether the same sides have rows, and the others the same bounds."""
-        if not np.array_equal(self.row_of, other.row_of):
-            return False
-        without = np.flatnonzero(self.row_of < 0)
-        return (self.fixings[without] != other.fixings[without]).nnz == 0
+        """Whether the same sides have rows: NLPs were built for these, and for nothing else here."""
+        return np.array_equal(self.row_of, other.row_of)
+
+    def take_bounds(self, other):
+        """Let sides without a row be zero at the bounds of ``other``, for the present values of parameters."""
+        self.fixings = other.fixings
+        self.__dict__.pop('_pattern', None)
 
 
 def sort_sides(c) -> Sides:
@@ -80,6 +82,8 @@ def sort_sides(c) -> Sides:
     _, _, J_G, J_H, _ = c.gradients(c.x0)
     at = c.evaluate(c.x0)
     A = sparse.vstack([J_G, J_H]).tocsr()
+    # a product with a parameter that is zero now does not depend on the other factor
+    A.eliminate_zeros()
     constant = np.concatenate([at.G, at.H]) - A @ c.x0
     direction, least = _least(A, c.lbx, c.ubx)
     fixable = ~c.nonlinear_sides & (np.abs(least + constant) <= EXACT)

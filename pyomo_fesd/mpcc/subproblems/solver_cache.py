@@ -32,7 +32,7 @@ class SolverCache:
         self.sides, self.nlps = None, {}
 
     def prepare(self, options):
-        """Sort the sides for the present bounds and parameters; drop NLP solvers that were built for others or with other options.
+        """Sort the sides for the present bounds and parameters; drop NLP solvers built for other rows or with other options.
 
         To be called before a run, and once before many starts: they share the bounds, and so the sides.
         """
@@ -40,3 +40,5 @@ class SolverCache:
         if self.sides is None or built_in != self._options or not sides.same_rows(self.sides):
             self.sides, self._options = sides, built_in
             self.nlps.clear()
+        else:
+            self.sides.take_bounds(sides)

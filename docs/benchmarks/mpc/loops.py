@@ -1,0 +1,89 @@
+"""The loops: three plants, each with predictive control by this package and by peers, with the same disturbances.
+
+``cpu`` and ``ipopt`` of a step are seconds of CPU: of everything, and inside casadi's NLP solvers (their own functions included).
+"""
+
+import importlib
+import logging
+import time
+from contextlib import contextmanager
+
+from benchmarks.profile.clock import NlpClock
+
+SEED = 1
+#: Seconds that a step of this package may take, by plant.
+DEADLINES = {'tank': 10.0, 'heater': 15.0, 'idaes': 30.0}
+EXAMPLES = {'tank': 'mpc_tank', 'heater': 'mpc_heater', 'idaes': 'idaes_mpc'}
+METHODS = (
+    *(('tank', 'pyomo_fesd'), ('tank', 'smoothed on a fixed grid'), ('tank', 'nosnoc 0.2.0')),
+    *(('heater', 'pyomo_fesd'), ('heater', 'smoothed on a fixed grid')),
+    *(('idaes', 'pyomo_fesd'), ('idaes', 'smoothed on a fixed grid')),
+)
+
+
+def run_loop(plant, method, steps):
+    """The table of steps of one loop, with ``cpu`` and ``ipopt``."""
+    logging.getLogger('pyomo_fesd').setLevel(logging.ERROR)
+    example, clock = importlib.import_module(EXAMPLES[plant]), NlpClock()
+    timed, limit = _Timed(clock), DEADLINES[plant] if method == 'pyomo_fesd' else None
+    with clock.running(), warnings_off():
+        options = {'pyomo_fesd': _own, 'smoothed on a fixed grid': _smoothed, 'nosnoc 0.2.0': _nosnoc}[method](plant, example)
+        control = options.pop('control')
+        _, table = example.loop(steps, SEED, limit, control=lambda problem: timed.of(control(problem)), **options)
+    table['cpu'], table['ipopt'] = timed.cpu, timed.ipopt
+    return table
+
+
+class _Timed:
+    """A controller whose steps are timed."""
+
+    def __init__(self, clock):
+        self._clock, self.cpu, self.ipopt = clock, [], []
+
+    def of(self, controller):
+        """Time this one."""
+        self._controller = controller
+        return self
+
+    def step(self, *given):
+        """One step."""
+        self._clock.reset()
+        began = time.process_time()
+        answer = self._controller.step(*given)
+        self.cpu.append(time.process_time() - began)
+        self.ipopt.append(self._clock.solving)
+        return answer
+
+
+@contextmanager
+def warnings_off():
+    """Without the messages of Pyomo about single loads of infeasible values."""
+    logger = logging.getLogger('pyomo')
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
+def _own(plant, example):
+    return {'control': example.control}
+
+
+def _smoothed(plant, example):
+    from benchmarks.mpc import smoothed  # needs IDAES
+
+    def control(problem):
+        place = problem.fs if plant == 'idaes' else problem
+        wrt, name = (place.time, 'pid') if plant == 'idaes' else (place.t, None)
+        u = place.pid.setpoint if name else place.u if plant == 'tank' else place.v
+        return smoothed.SmoothedControl(problem, wrt, u, example.INTERVAL)
+
+    return {'build': getattr(smoothed, plant), 'control': control}
+
+
+def _nosnoc(plant, example):
+    from benchmarks.mpc.nosnoc_peer import NosnocControl
+
+    return {'control': NosnocControl}

@@ -1,0 +1,91 @@
+"""Closed loops of predictive control: time of each step, where its answer comes from, and the cost of the loop.
+
+    .venv/bin/pip install nosnoc==0.2.0 idaes-pse
+    .venv/bin/python docs/benchmarks/mpc/run.py [--only PLANT] [--method METHOD] [--steps 200]
+
+Each loop is a process of its own.  Writes a file of steps for each of them, steps_PLANT_METHOD.csv, the summary rows.csv, and
+draws summary.png.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import benchmarks  # noqa: F401  puts the examples on the path
+import pandas as pd
+from benchmarks.common.processes import json_lines
+from benchmarks.mpc.loops import METHODS, run_loop
+from matplotlib.figure import Figure
+
+HERE = Path(__file__).parent
+#: Seconds for one loop.
+LIMIT = 2400
+ORIGINS = ('branch', 'simulated branch', 'full run', 'deadline', 'plan')
+
+
+def file_of(plant, method):
+    """The file of the steps of one loop."""
+    return HERE / f"steps_{plant}_{method.split()[0]}.csv"
+
+
+def summary(plant, method, table):
+    """One row about a loop."""
+    counts = table['origin'].value_counts()
+    row = {'plant': plant, 'method': method, 'steps': len(table)} | {origin: int(counts.get(origin, 0)) for origin in ORIGINS}
+    row |= {'certified': int(table['certified'].sum()), 'median ms': 1e3 * table['seconds'].median()}
+    row |= {'max ms': 1e3 * table['seconds'].max(), 'cost': table['cost'].sum()}
+    in_branch = table[(table['origin'] == 'branch') & (table['ipopt'] > 0)]
+    for name, part in (('branch', in_branch), ('all', table[table['ipopt'] > 0])):
+        row[f'CPU / Ipopt, {name}'] = (part['cpu'] / part['ipopt']).median() if len(part) else None
+    return row
+
+
+def draw():
+    """Time of each step by its origin, and the cost of each loop so far."""
+    tables = {(plant, method): pd.read_csv(file_of(plant, method)) for plant, method in METHODS if file_of(plant, method).exists()}
+    plants = list(dict.fromkeys(plant for plant, _ in tables))
+    figure = Figure(figsize=(4 * len(plants), 6), layout='constrained')
+    axes = figure.subplots(2, len(plants), squeeze=False)
+    for column, plant in zip(axes.T, plants):
+        times, costs = column
+        for (_, method), table in ((key, t) for key, t in tables.items() if key[0] == plant):
+            if method == 'pyomo_fesd':
+                for number, origin in enumerate(ORIGINS):
+                    some = table[table['origin'] == origin]
+                    times.semilogy(some.index, some['seconds'], '.', color=f'C{number}', label=origin)
+            else:
+                times.semilogy(table.index, table['seconds'], linewidth=0.6, color='0.7' if method[0] == 's' else 'k', label=method)
+            costs.plot(table['cost'].cumsum(), label=method)
+        times.set(title=plant, ylabel='time of a step (s)')
+        costs.set(xlabel='step', ylabel='cost of the loop so far')
+        times.legend(fontsize=7)
+        costs.legend(fontsize=7)
+    figure.savefig(HERE / 'summary.png', dpi=150)
+
+
+def main():
+    """Run the chosen loops, then write the summary of all that have steps."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--only', help="one plant")
+    parser.add_argument('--method', help="one method")
+    parser.add_argument('--steps', type=int, default=200)
+    parser.add_argument('--here', action='store_true', help=argparse.SUPPRESS)
+    chosen = parser.parse_args()
+    for plant, method in METHODS:
+        if chosen.only in (None, plant) and chosen.method in (None, method):
+            if chosen.here:
+                run_loop(plant, method, chosen.steps).to_csv(file_of(plant, method), float_format='%.5g')
+                return
+            began = time.perf_counter()
+            _, status = json_lines(__file__, '--here', '--only', plant, '--method', method, '--steps', chosen.steps, limit=LIMIT)
+            print(f"{plant}, {method}: {status}, {time.perf_counter() - began:.0f} s", flush=True)
+    found = [summary(*key, pd.read_csv(file_of(*key))) for key in METHODS if file_of(*key).exists()]
+    pd.DataFrame(found).to_csv(HERE / 'rows.csv', index=False, float_format='%.4g')
+    draw()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,241 @@
+"""``Controller``: one step of model predictive control after the other, each with an answer by its deadline.
+
+A step shifts the plan of the step before, loads what was measured, and tries, as long as there is time,
+
+1. the branch of the shifted plan: one NLP and its certificate;
+2. the branch of a simulation from the measured state with the shifted controls, which has the modes that the plant will have;
+3. the full run: the homotopy.
+
+The first certified solution is the answer; without one the best feasible point; without any the shifted plan itself.
+
+Takes: a model on a moving grid, compiled once.
+Leaves: the new plan as the values of the model.
+Does not apply: to controls that are not held on control stages.
+"""
+
+import time
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from pyomo.contrib.mpc import ScalarData
+from pyomo.contrib.solver.common.factory import SolverFactory
+from pyomo.contrib.solver.common.results import SolutionStatus
+from pyomo.core import Block, Objective, Var
+from pyomo.dae import ContinuousSet
+from pyomo.gdp import Disjunct
+
+from pyomo_fesd.control.control_step import BRANCH, DEADLINE, FULL, PLAN, SIMULATED, ControlStep
+from pyomo_fesd.control.moving_interface import MovingModelInterface
+from pyomo_fesd.control.states import first_states
+from pyomo_fesd.core import FesdError, interruptible, is_indexed_by
+from pyomo_fesd.mpcc import Deadline
+
+#: Options of the attempts of a step, and where their certified solutions come from unless a homotopy was needed; without a plan
+#: the first attempt is left out.
+ATTEMPTS = ({'warm_start': 'only'}, BRANCH), ({'simulate_first': True}, SIMULATED)
+#: One more attempt of a thorough step.
+HOMOTOPY = ({'simulate_first': False}, FULL)
+#: Seconds left without which no further attempt begins.
+LEAST = 1e-3
+
+
+class Controller:
+    """Model predictive control of a hybrid system: the model is compiled once, and each step solves it again.
+
+    Parameters
+    ----------
+    model : Block
+        the control problem after ``fesd.finite_elements``: an objective, states fixed at the first time, control stages of equal
+        length and number of elements
+    controls : list of Var
+        over time, held on each control stage (``piecewise_constant``)
+    parameters : list of components
+        fixed variables and mutable Params whose values may change besides the states and modes at the first time: references,
+        prices, disturbances; bounds of variables may change as well
+    wrt : ContinuousSet, optional
+    rise : float, optional
+        where the objective of a new plan is above that of the plan before by more than this part, the homotopy is tried as well,
+        and the better one kept: the shifted branch may hold a local solution that a disturbance has made poor
+    options : options of ``mpec_hybrid`` for every solve
+
+    Attributes
+    ----------
+    interface : MovingModelInterface
+        of the model
+
+    Raises
+    ------
+    FesdError
+        as ``set_instance`` and ``MovingModelInterface``, and for controls that are not variables over time
+    """
+
+    def __init__(
+        self,
+        model: Block,
+        controls: Sequence[Var],
+        parameters: Iterable = (),
+        wrt: ContinuousSet | None = None,
+        rise: float | None = None,
+        **options,
+    ):
+        self.interface = MovingModelInterface(model, wrt)
+        self._model, self._controls = model, _checked(controls, self.interface.time)
+        self._options = {'review': False} | options
+        self._solver, self._has_plan = SolverFactory('mpec_hybrid'), False
+        self._rise, self._objective = rise, None
+        self._variables = list(model.component_data_objects(Var, descend_into=(Block, Disjunct)))
+        given = [*first_states(model, self.interface.time), *self.interface.mode_multipliers, *parameters]
+        self._solver.set_instance(model, parameters=given, **options)
+
+    @interruptible
+    def step(
+        self, measured: Any = None, modes: Iterable = (), time_limit: float | None = None, thorough: bool = False
+    ) -> ControlStep:
+        """Shift the plan, load the measurement, solve.
+
+        Parameters
+        ----------
+        measured : ScalarData or dict, optional
+            values at the first time, as ``load_data`` takes them, e.g. ``{m.x: 0.3}``
+        modes : list of Disjunct or str, optional
+            modes with hysteresis at the first time, as ``load_modes`` takes them
+        time_limit : float, optional
+            seconds for the whole step
+        thorough : bool
+            make all attempts, and the homotopy, though one is certified before, and keep the best: a certified plan is a local
+            solution, and the shifted one may have become a poor one
+
+        Raises
+        ------
+        FesdError
+            for data that the model does not have, and for changes of the model that are not listed in ``parameters``
+        """
+        began, deadline, before = time.perf_counter(), Deadline.after(time_limit), self.values()
+        try:
+            search = self._searched(measured, modes, deadline, thorough)
+        except Exception:
+            self.load(before)
+            raise
+        self._has_plan = self._has_plan or search.best is not None
+        self._objective = None if search.best is None else search.best.incumbent_objective
+        return search.answer(began, self.present_controls())
+
+    def _searched(self, measured, modes, deadline, thorough):
+        """The ``_Search`` of one step."""
+        if self._has_plan:
+            self.interface.shift_values_by_time()
+        if measured is not None:
+            self.interface.load_data(measured, time_points=[self.interface.time.first()])
+        self.interface.load_modes(modes)
+        search = _Search(self, deadline)
+        search.run(ATTEMPTS if self._has_plan else ATTEMPTS[1:], thorough)
+        if thorough or self._has_risen(search.best):
+            search.run([HOMOTOPY], True)
+        return search
+
+    def present_controls(self) -> ScalarData:
+        """Return the controls of the first control stage that the model has now, within their bounds."""
+        last = self.interface.moving.grid.elements[0].points[-1]
+        return ScalarData({u: _within_bounds(u[last]) for u in self._controls}, time_set=self.interface.time)
+
+    def _has_risen(self, best):
+        """Whether the objective is above that of the step before by more than ``rise``; one that is maximised is below it."""
+        if best is None or self._rise is None or self._objective is None:
+            return False
+        return self.sense * (best.incumbent_objective - self._objective) > self._rise * abs(self._objective)
+
+    # called by the search
+
+    @property
+    def sense(self) -> int:
+        """1 where the objective is minimised, -1 where it is maximised."""
+        return int(next(self._model.component_data_objects(Objective, active=True)).sense)
+
+    def solve(self, options: dict, time_limit: float | None):
+        """Solve from the present values; returns Pyomo's results."""
+        limits = {} if time_limit is None else {'time_limit': time_limit}
+        settings = {'raise_exception_on_nonoptimal_result': False} | self._options | options | limits
+        return self._solver.solve(self._model, **settings)
+
+    def values(self) -> list:
+        """Return the values of all variables."""
+        return [v.value for v in self._variables]
+
+    def load(self, values: list) -> None:
+        """Give all variables their values of before."""
+        for v, number in zip(self._variables, values):
+            v.set_value(number, skip_validation=True)
+
+
+class _Search:
+    """The attempts of one step.
+
+    Attributes
+    ----------
+    best : Results or None
+        of the best feasible point
+    """
+
+    def __init__(self, controller, deadline):
+        self._controller, self._deadline = controller, deadline
+        self._plan, self._results, self._late = controller.values(), [], False
+        self.best, self._values, self._origin = None, self._plan, PLAN
+
+    def run(self, attempts, all_of_them):
+        """Make attempts until one is certified, or all; the model has the values of the best one, or those of the plan."""
+        for options, origin in attempts:
+            left = self._deadline.left()
+            if left is not None and left < LEAST:
+                self._late = True
+                break
+            results = self._controller.solve(options, left)
+            self._results.append(results)
+            if self._improves(results):
+                self.best, self._values, self._origin = results, self._controller.values(), _origin(results, origin)
+            if results.solution_status is SolutionStatus.optimal and not all_of_them:
+                return
+            self._controller.load(self._values)
+        self._controller.load(self._values)
+
+    def _improves(self, results):
+        """Whether this is the first feasible point, or better than the one before: certified before uncertified."""
+        if results.solution_status not in (SolutionStatus.optimal, SolutionStatus.feasible):
+            return False
+        return self.best is None or self._rank(results) < self._rank(self.best)
+
+    def _rank(self, results):
+        sense = self._controller.sense
+        return results.solution_status is not SolutionStatus.optimal, sense * results.incumbent_objective
+
+    def answer(self, began, controls) -> ControlStep:
+        """The best point as a ``ControlStep``."""
+        certified = self.best is not None and self.best.solution_status is SolutionStatus.optimal
+        origin = DEADLINE if self.best is not None and not certified and self._deadline.expired() else self._origin
+        objective = None if self.best is None else self.best.incumbent_objective
+        seconds = time.perf_counter() - began
+        return ControlStep(controls, origin, certified, self._reason(), objective, seconds, self._results)
+
+    def _reason(self):
+        if self.best is not None:
+            return self.best.extra_info.reason
+        found = [f"{r.extra_info.outcome}: {r.extra_info.reason}" for r in self._results[-1:]]
+        late = ["no time was left"] if self._late else []
+        return "the plan before goes on; " + '; '.join([*found, *late])
+
+
+def _origin(results, origin):
+    """Where a feasible point comes from; relaxations belong to the full run."""
+    return FULL if any(step.kind in ('relaxation', 'restoration') for step in results.extra_info.steps) else origin
+
+
+def _checked(controls, wrt):
+    for u in controls:
+        if getattr(u, 'ctype', None) is not Var or not is_indexed_by(u, wrt):
+            raise FesdError(getattr(u, 'name', repr(u)), f"Controller: not a Var over '{wrt.name}'", "give e.g. controls=[m.u]")
+    return list(controls)
+
+
+def _within_bounds(v):
+    low, high = v.bounds
+    number = v.value
+    return min(number if low is None else max(number, low), float('inf') if high is None else high)
