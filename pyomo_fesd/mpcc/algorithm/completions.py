@@ -20,8 +20,8 @@ LAST, AROUND = 1e-3, (1e-1, 1e-2)
 #: Times that relaxations go around the best point at most, and the part by which its objective must fall to go on.
 CYCLES, PROGRESS = 6, 1e-3
 #: First eps of a second path, relative to that of the first; it is followed where the relaxations around the best point have an
-#: objective that is smaller by this part.
-LOOSER, GAP = 10.0, 0.5
+#: objective that is smaller by the second part, or the third part of the first path's relaxations did not reach their solutions.
+LOOSER, GAP, ASTRAY = 10.0, 0.5, 0.5
 #: Part of the time limit after which no further round begins: the best point is certified in the rest.
 SHARE = 0.6
 #: A completion may take this many times as long as the relaxation before, and at least these seconds.
@@ -52,18 +52,22 @@ class Completions:
     def follow(self, start):
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
         for eps in (self._options.eps_init, self._options.eps_init * LOOSER):
-            self._down(start, eps)
+            is_astray = self._down(start, eps)
             self._improve()
-            if not self._possible or not self._promising() or self._deadline.expired():
+            if not self._possible or not (is_astray or self._promising()) or self._deadline.expired():
                 break
         if self.run.point is not None:
             self._certify()
 
     def _down(self, w, eps):
-        """Rounds with ever smaller eps, each from the relaxation before."""
+        """Rounds with ever smaller eps, each from the relaxation before; returns whether many did not reach their solutions."""
+        solved = []
         while eps * ROUND_OFF >= max(LAST, self._options.eps_final) and not self._deadline.expired():
-            w = self._round(w, eps)
+            relaxed = self._round(w, eps)
+            solved.append(relaxed.solved)
+            w = relaxed.w
             eps *= self._options.eps_factor
+        return solved.count(False) >= ASTRAY * len(solved)
 
     def _improve(self):
         """Rounds around the best point, until they no longer find a much better one."""
@@ -84,7 +88,7 @@ class Completions:
         return point is None or point.f - self._promise > GAP * abs(point.f)
 
     def _round(self, w, eps):
-        """One relaxation from ``w``, and the branch of its completion; returns the relaxation's point."""
+        """One relaxation from ``w``, and the branch of its completion; returns the relaxation's result."""
         self.run.eps = eps
         began = time.perf_counter()
         relaxed = self._subsolves.relax(self._form, w, eps, None, self._options.relaxation_iterations)
@@ -99,7 +103,7 @@ class Completions:
             if narrow:
                 self._c.narrow()
         self._after(self.run)
-        return relaxed.w
+        return relaxed
 
     def _branch_of_completion(self, w, seconds):
         """Solve the branch that the completion of ``w`` names; where that stops on its way, the completion of its end once more."""
