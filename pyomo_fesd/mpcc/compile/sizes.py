@@ -75,8 +75,8 @@ def beside(start: np.ndarray) -> np.ndarray:
 def row_factors(jacobians: Sequence, given: np.ndarray) -> np.ndarray:
     """Return the factors of rows; one of the user (not 1) is kept.
 
-    A row whose gradient is large at one of the points only is near a singularity there, such as a logarithmic mean of equal numbers.
-    It is not large, and with the factor 1/gradient nothing would be left of it: the least of the largest entries counts.
+    A row whose gradient is large at one of the points only is near a singularity there, such as a logarithmic mean of equal
+    numbers.  With the factor 1/gradient nothing would be left of it: the least of the largest entries counts.
 
     Parameters
     ----------
@@ -85,7 +85,8 @@ def row_factors(jacobians: Sequence, given: np.ndarray) -> np.ndarray:
     given : array (rows)
     """
     largest = [abs(J).max(axis=1).toarray().ravel() if J.shape[1] else np.zeros(J.shape[0]) for J in jacobians]
-    return np.where(given != 1.0, given, _factors(np.fmin.reduce([np.where(np.isfinite(g), g, np.nan) for g in largest]), MILD_ROWS))
+    least = np.fmin.reduce([np.where(np.isfinite(g), g, np.nan) for g in largest])
+    return np.where(given != 1.0, given, _factors(least, MILD_ROWS))
 
 
 def _factors(sizes, mild):

@@ -72,19 +72,19 @@ def throttle(m):
     bed.gas_inlet.flow_mol[0].fix()
     fs.gate = Disjunction(
         fs.time,
-        rule=lambda b, t: Disjunction.Skip
-        if t == fs.time.first()
-        else [
-            [bed.solid_properties[t, middle].temperature >= cool, bed.gas_inlet.flow_mol[t] == 20],
-            [bed.solid_properties[t, middle].temperature <= cool, bed.gas_inlet.flow_mol[t] == 10],
-        ],
+        rule=lambda b, t: (
+            Disjunction.Skip
+            if t == fs.time.first()
+            else [
+                [bed.solid_properties[t, middle].temperature >= cool, bed.gas_inlet.flow_mol[t] == 20],
+                [bed.solid_properties[t, middle].temperature <= cool, bed.gas_inlet.flow_mol[t] == 10],
+            ]
+        ),
     )
 
 
 CASES = {
-    'TGA': Case(
-        'models_extra/gas_solid_contactors/flowsheets/dyn_TGA_example.py: main', tga, leaner_gas, flowsheet_time, (100,)
-    ),
+    'TGA': Case('models_extra/gas_solid_contactors/flowsheets/dyn_TGA_example.py: main', tga, leaner_gas, flowsheet_time, (100,)),
     'fixed bed 0D': Case(
         'models_extra/gas_solid_contactors/unit_models/tests/test_FB0D.py: TestIronOC',
         bed_0d,
