@@ -54,8 +54,6 @@ class IdealWaterParameters(PhysicalParameterBlock):
     def define_metadata(cls, obj):
         names = ('flow_mol', 'enth_mol', 'pressure', 'temperature', 'dens_mol', 'flow_vol')
         obj.add_properties({name: {'method': None} for name in names})
-            {name: {'method': None} for name in ('flow_mol', 'enth_mol', 'pressure', 'temperature', 'dens_mol', 'flow_vol')}
-        )
         obj.add_default_units({'time': units.s, 'length': units.m, 'mass': units.kg, 'amount': units.mol, 'temperature': units.K})
 
 
