@@ -76,7 +76,7 @@ def row_factors(jacobians: Sequence, given: np.ndarray) -> np.ndarray:
     """Return the factors of rows; one of the user (not 1) is kept.
 
     A row whose gradient is large at one of the points only is near a singularity there, such as a logarithmic mean of equal
-    numbers.  It is not large, and with the factor 1/gradient nothing would be left of it: the least of the largest entries counts.
+    numbers.  With the factor 1/gradient nothing would be left of it: the least of the largest entries counts.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class IdealWaterParameters(PhysicalParameterBlock):
 
     def build(self):
         super().build()
-        self._state_block_class = IdealWaterStateBlock
+        self._state_block_class = IdealWaterStateBlock  # noqa: F821  IDAES' decorator makes it, below
         self.is_gas = self.config.phase_presentation is PhaseType.G
         if self.is_gas:
             self.Vap = VaporPhase()
@@ -52,10 +52,9 @@ class IdealWaterParameters(PhysicalParameterBlock):
 
     @classmethod
     def define_metadata(cls, obj):
-        obj.add_properties({name: {'method': None} for name in ('flow_mol', 'enth_mol', 'pressure', 'temperature', 'dens_mol', 'flow_vol')})
-        obj.add_default_units(
-            {'time': units.s, 'length': units.m, 'mass': units.kg, 'amount': units.mol, 'temperature': units.K}
-        )
+        names = ('flow_mol', 'enth_mol', 'pressure', 'temperature', 'dens_mol', 'flow_vol')
+        obj.add_properties({name: {'method': None} for name in names})
+        obj.add_default_units({'time': units.s, 'length': units.m, 'mass': units.kg, 'amount': units.mol, 'temperature': units.K})
 
 
 class _IdealWaterStates(StateBlock):
