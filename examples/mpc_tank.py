@@ -185,10 +185,10 @@ class Disturbances:
         return self.feeds
 
 
-def control(problem):
-    """Build the controller."""
+def control(problem, rise=0.1):
+    """Build the controller; with ``rise`` it leaves local solutions that got poor."""
     changing = [problem.P_ref, problem.F_L, problem.F_G]
-    return pyomo_fesd.Controller(problem, [problem.u], changing, rise=0.1)
+    return pyomo_fesd.Controller(problem, [problem.u], changing, rise=rise)
 
 
 def loop(steps=60, seed=0, time_limit=None, build=control_problem, control=control):
