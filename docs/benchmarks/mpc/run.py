@@ -26,7 +26,7 @@ LIMIT = 2400
 #: Lines of the other methods.
 COLORS = {'pyomo_fesd, rise=0.1': 'C7', 'smoothed on a fixed grid': '0.7', 'nosnoc 0.2.0': 'k'}
 #: Steps that all loops have made.
-COMMON = 60
+COMMON = 25
 ORIGINS = ('branch', 'simulated branch', 'full run', 'deadline', 'plan')
 
 
@@ -47,6 +47,7 @@ def summary(plant, method, table):
         'cost': table['cost'].sum(),
         f'cost, first {COMMON}': table['cost'][:COMMON].sum(),
     }
+    row[f'median CPU ms, first {COMMON}'] = 1e3 * table['cpu'][:COMMON].median()
     in_branch = table[(table['origin'] == 'branch') & (table['ipopt'] > 0)]
     for name, part in (('branch', in_branch), ('all', table[table['ipopt'] > 0])):
         row[f'CPU / Ipopt, {name}'] = (part['cpu'] / part['ipopt']).median() if len(part) else None
@@ -71,7 +72,7 @@ def draw():
             costs.plot(table['cost'].cumsum(), label=method)
         times.set(title=plant, ylabel='time of a step (s)')
         costs.set(xlabel='step', ylabel='cost of the loop so far')
-        times.legend(fontsize=7)
+        times.legend(fontsize=6, framealpha=0.5)
         costs.legend(fontsize=7)
     figure.savefig(HERE / 'summary.png', dpi=150)
 
