@@ -69,11 +69,11 @@ def warnings_off():
 
 
 def _own(plant, example):
-    return {'control': partial(example.control, rise=None) if plant == 'tank' else example.control}
+    return {'control': example.control}
 
 
 def _with_rise(plant, example):
-    return {'control': example.control}
+    return {'control': partial(example.control, rise=0.1)}
 
 
 def _smoothed(plant, example):
