@@ -185,7 +185,7 @@ class Disturbances:
 
 
 def control(problem, rise=None):
-    """Build the controller; with ``rise`` the homotopy is tried where plans get worse."""
+    """Build the controller; with ``rise`` a worse plan is not taken unquestioned."""
     changing = [problem.P_ref, problem.F_L, problem.F_G]
     return pyomo_fesd.Controller(problem, [problem.u], changing, rise=rise)
 
