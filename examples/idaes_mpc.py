@@ -86,7 +86,7 @@ def control(problem):
     return pyomo_fesd.Controller(problem, [fs.pid.setpoint], [fs.reference])
 
 
-def loop(steps=40, seed=0, time_limit=10, build=control_problem, control=control):
+def loop(steps=24, seed=0, time_limit=10, build=control_problem, control=control):
     """Close the loop; returns plant and the table of steps with the cost of each."""
     problem, real, chance, losses = build(), plant(), random.Random(seed), []
     controller = control(problem)

@@ -5,8 +5,7 @@ Predictive control of a tank with a switching outlet
 A closed tank with feeds of liquid and gas has one outlet: liquid leaves while the level
 is above it, gas while it is below, and where neither mode alone can hold the level it
 slides at the outlet. The controller sets the opening of the valve every two seconds so
-that the pressure follows a reference; where the objective of a plan rises, it looks
-for another local solution. The plant is not the model: its valve is smaller
+that the pressure follows a reference. The plant is not the model: its valve is smaller
 and its feeds jump at times that nobody foresees, so the outlet changes its mode at such
 times too. A moving-horizon estimator finds the present feeds from the last four
 intervals, with the same switching model. The simulated plant has the right answer by
@@ -185,10 +184,10 @@ class Disturbances:
         return self.feeds
 
 
-def control(problem):
-    """Build the controller."""
+def control(problem, rise=None):
+    """Build the controller; with ``rise`` a worse plan is not taken unquestioned."""
     changing = [problem.P_ref, problem.F_L, problem.F_G]
-    return pyomo_fesd.Controller(problem, [problem.u], changing, rise=0.1)
+    return pyomo_fesd.Controller(problem, [problem.u], changing, rise=rise)
 
 
 def loop(steps=60, seed=0, time_limit=None, build=control_problem, control=control):

@@ -7,6 +7,7 @@ import importlib
 import logging
 import time
 from contextlib import contextmanager
+from functools import partial
 
 from benchmarks.profile.clock import NlpClock
 
@@ -15,7 +16,7 @@ SEED = 1
 DEADLINES = {'tank': 10.0, 'heater': 15.0, 'idaes': 30.0}
 EXAMPLES = {'tank': 'mpc_tank', 'heater': 'mpc_heater', 'idaes': 'idaes_mpc'}
 METHODS = (
-    *(('tank', 'pyomo_fesd'), ('tank', 'smoothed on a fixed grid'), ('tank', 'nosnoc 0.2.0')),
+    *(('tank', 'pyomo_fesd'), ('tank', 'pyomo_fesd, rise=0.1'), ('tank', 'smoothed on a fixed grid'), ('tank', 'nosnoc 0.2.0')),
     *(('heater', 'pyomo_fesd'), ('heater', 'smoothed on a fixed grid')),
     *(('idaes', 'pyomo_fesd'), ('idaes', 'smoothed on a fixed grid')),
 )
@@ -25,9 +26,9 @@ def run_loop(plant, method, steps):
     """The table of steps of one loop, with ``cpu`` and ``ipopt``."""
     logging.getLogger('pyomo_fesd').setLevel(logging.ERROR)
     example, clock = importlib.import_module(EXAMPLES[plant]), NlpClock()
-    timed, limit = _Timed(clock), DEADLINES[plant] if method == 'pyomo_fesd' else None
+    timed, limit = _Timed(clock), DEADLINES[plant] if method.startswith('pyomo_fesd') else None
     with clock.running(), warnings_off():
-        options = {'pyomo_fesd': _own, 'smoothed on a fixed grid': _smoothed, 'nosnoc 0.2.0': _nosnoc}[method](plant, example)
+        options = CONTROLS[method](plant, example)
         control = options.pop('control')
         _, table = example.loop(steps, SEED, limit, control=lambda problem: timed.of(control(problem)), **options)
     table['cpu'], table['ipopt'] = timed.cpu, timed.ipopt
@@ -71,6 +72,10 @@ def _own(plant, example):
     return {'control': example.control}
 
 
+def _with_rise(plant, example):
+    return {'control': partial(example.control, rise=0.1)}
+
+
 def _smoothed(plant, example):
     from benchmarks.mpc import smoothed  # needs IDAES
 
@@ -87,3 +92,12 @@ def _nosnoc(plant, example):
     from benchmarks.mpc.nosnoc_peer import NosnocControl
 
     return {'control': NosnocControl}
+
+
+#: Method -> function of the name of a plant and its example, which returns keywords of the example's ``loop``.
+CONTROLS = {
+    'pyomo_fesd': _own,
+    'pyomo_fesd, rise=0.1': _with_rise,
+    'smoothed on a fixed grid': _smoothed,
+    'nosnoc 0.2.0': _nosnoc,
+}

@@ -23,12 +23,17 @@ from matplotlib.figure import Figure
 HERE = Path(__file__).parent
 #: Seconds for one loop.
 LIMIT = 2400
+#: Lines of the other methods.
+COLORS = {'pyomo_fesd, rise=0.1': 'C7', 'smoothed on a fixed grid': '0.7', 'nosnoc 0.2.0': 'k'}
+#: Steps that all loops have made.
+COMMON = 25
 ORIGINS = ('branch', 'simulated branch', 'full run', 'deadline', 'plan')
 
 
 def file_of(plant, method):
     """The file of the steps of one loop."""
-    return HERE / f"steps_{plant}_{method.split()[0]}.csv"
+    name = method.split(' on ')[0].replace(', ', '_').replace(' 0.2.0', '').replace('=0.1', '')
+    return HERE / f'steps_{plant}_{name}.csv'
 
 
 def summary(plant, method, table):
@@ -36,7 +41,13 @@ def summary(plant, method, table):
     counts = table['origin'].value_counts()
     row = {'plant': plant, 'method': method, 'steps': len(table)} | {origin: int(counts.get(origin, 0)) for origin in ORIGINS}
     row |= {'certified': int(table['certified'].sum()), 'median ms': 1e3 * table['seconds'].median()}
-    row |= {'max ms': 1e3 * table['seconds'].max(), 'cost': table['cost'].sum()}
+    row |= {'max ms': 1e3 * table['seconds'].max()}
+    row |= {
+        'median CPU ms': 1e3 * table['cpu'].median(),
+        'cost': table['cost'].sum(),
+        f'cost, first {COMMON}': table['cost'][:COMMON].sum(),
+    }
+    row[f'median CPU ms, first {COMMON}'] = 1e3 * table['cpu'][:COMMON].median()
     in_branch = table[(table['origin'] == 'branch') & (table['ipopt'] > 0)]
     for name, part in (('branch', in_branch), ('all', table[table['ipopt'] > 0])):
         row[f'CPU / Ipopt, {name}'] = (part['cpu'] / part['ipopt']).median() if len(part) else None
@@ -57,11 +68,11 @@ def draw():
                     some = table[table['origin'] == origin]
                     times.semilogy(some.index, some['seconds'], '.', color=f'C{number}', label=origin)
             else:
-                times.semilogy(table.index, table['seconds'], linewidth=0.6, color='0.7' if method[0] == 's' else 'k', label=method)
+                times.semilogy(table.index, table['seconds'], linewidth=0.6, color=COLORS[method], label=method)
             costs.plot(table['cost'].cumsum(), label=method)
         times.set(title=plant, ylabel='time of a step (s)')
         costs.set(xlabel='step', ylabel='cost of the loop so far')
-        times.legend(fontsize=7)
+        times.legend(fontsize=6, framealpha=0.5)
         costs.legend(fontsize=7)
     figure.savefig(HERE / 'summary.png', dpi=150)
 
