@@ -9,7 +9,7 @@ with P = M_G R T / (V - M_L/rho_L) eliminated.  All N finite elements form one p
 default options of nosnoc.
 """
 
-from time import process_time
+from time import perf_counter
 
 import casadi as ca
 import gas_liquid_tank as plant
@@ -55,12 +55,12 @@ def solve_tank_with_nosnoc(N, K, scheme='RADAU', tolerance=None):
     Returns the 'build' and 'solve' times in s, the 'nlps' of the homotopy and the sum of their 'iterations', 't_s', 'M_G_end', and
     the 'status' that nosnoc reports, which is that of the last NLP.
     """
-    started = process_time()
+    started = perf_counter()
     settings = options(scheme, tolerance, terminal_time=plant.HORIZON, N_finite_elements=N, n_s=K, print_level=0)
     solver = NosnocSolver(settings, tank_model())
-    built = process_time()
+    built = perf_counter()
     results = solver.solve()
-    solved = process_time()
+    solved = perf_counter()
     return {
         'build': built - started,
         'solve': solved - built,
