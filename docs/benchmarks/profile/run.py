@@ -91,7 +91,7 @@ def draw(table):
         axis.text(end + 0.01, y, f"{row['label']}: {row['total']:.3g} s", va='center', fontsize=8)
     axis.set_yticks(range(len(names)), names)
     axis.invert_yaxis()
-    axis.set_xlim(0, 1.2)
+    axis.set_xlim(0, max(1.2, 0.2 + max(row['total'] / first[row['workload']] for _, row in rows)))
     axis.set_xlabel(f"CPU time, {labels[0]} = 1")
     figure.legend(loc='outside lower center', ncols=6, fontsize=8)
     return figure
