@@ -25,7 +25,7 @@ ORDER = (
     'gearbox_car',
     'projected_ellipse',
     'toy_mpec',
-    'pump_schedule',
+    'valve_schedule',
     'two_stage_tank',
     'idaes_overflow',
     'idaes_two_tanks',
