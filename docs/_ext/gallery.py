@@ -27,7 +27,7 @@ ORDER = (
     'mpc_heater',
     'projected_ellipse',
     'toy_mpec',
-    'pump_schedule',
+    'valve_schedule',
     'two_stage_tank',
     'idaes_overflow',
     'idaes_two_tanks',

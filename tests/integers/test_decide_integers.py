@@ -3,9 +3,9 @@
 from itertools import product
 
 import numpy as np
-import pump_schedule
 import pyomo.environ as pyo
 import pytest
+import valve_schedule
 from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity, complements
 from scipy.integrate import solve_ivp
@@ -94,7 +94,7 @@ def test_the_solver_points_to_it():
 
 def simulated(schedule):
     """Costs of a schedule of the example by scipy."""
-    e = pump_schedule
+    e = valve_schedule
 
     def rates(t, x, y):
         spill = e.WEIR * max(0.0, x[0] - e.HEIGHT)
@@ -108,11 +108,11 @@ def simulated(schedule):
 
 def test_example(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    pump_schedule.main()
+    valve_schedule.main()
     said = capsys.readouterr().out
     assert 'Of 32 schedules, 32 certified, the best is [0, 1, 1, 0, 0]' in said
-    assert (tmp_path / 'pump_schedule.png').stat().st_size > 10_000
-    costs = {schedule: simulated(schedule) for schedule in product((0, 1), repeat=pump_schedule.HOURS)}
+    assert (tmp_path / 'valve_schedule.png').stat().st_size > 10_000
+    costs = {schedule: simulated(schedule) for schedule in product((0, 1), repeat=valve_schedule.HOURS)}
     assert min(costs, key=costs.get) == (0, 1, 1, 0, 0)
     # elements of half an hour with three points
     assert float(said.split('best is')[1].split('costs ')[1].split()[0]) == pytest.approx(costs[0, 1, 1, 0, 0], abs=2e-3)

@@ -97,8 +97,8 @@ OUTPUTS = {
 }
 
 
-def reference(feed, amplitude, frequency, valve, outlet, liquid):
-    """``OUTPUTS`` of a scenario by scipy, each mode integrated to its event."""
+def reference(feed, amplitude, frequency, valve, outlet, liquid, max_step=0.25):
+    """``OUTPUTS`` of a scenario by scipy, each mode integrated to its event; shorter excursions than ``max_step`` may be missed."""
 
     def F_L(t):
         return feed * (1 + amplitude * np.sin(frequency * t))
@@ -120,7 +120,7 @@ def reference(feed, amplitude, frequency, valve, outlet, liquid):
     while t < plant.HORIZON:
         event, event.direction = events[mode]
         event.terminal = True
-        run = solve_ivp(rates[mode], (t, plant.HORIZON), x, 'DOP853', events=event, rtol=1e-11, atol=1e-11, max_step=0.25)
+        run = solve_ivp(rates[mode], (t, plant.HORIZON), x, 'DOP853', events=event, rtol=1e-11, atol=1e-11, max_step=max_step)
         t, x = run.t[-1], run.y[:, -1].tolist()
         if run.status == 1:
             times.append(t)

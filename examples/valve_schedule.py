@@ -24,7 +24,7 @@ import pyomo_fesd
 PRICES = (1.2, 0.8, 0.5, 1.5, 0.7)
 HOURS = len(PRICES)
 INFLOW, SWING, VALVE, WEIR, HEIGHT, PENALTY = 0.7, 0.5, 1.5, 3.0, 1.0, 2.0
-PICTURE = 'pump_schedule.png'
+PICTURE = 'valve_schedule.png'
 
 
 def build():
