@@ -9,13 +9,14 @@ Does not apply: to singular systems; the answer is None.
 import numpy as np
 from scipy import sparse
 from scipy.linalg import lapack
+from scipy.sparse.csgraph import structural_rank
 from scipy.sparse.linalg import splu
 
 from pyomo_fesd.simulation.element_residuals import ElementResiduals
 
-#: Up to these numbers of unknowns a dense method is faster, for square systems and for least squares.  Above them OpenBLAS uses
-#: threads, which wait for one another where the machine is busy: 30 to 200 ms for a step instead of one.
-DENSE, DENSE_LEAST_SQUARES = 120, 60
+#: Up to these numbers of unknowns a dense method is taken, for square systems and least squares: faster, and safer for the latter,
+#: which may have dependent columns.  Above them OpenBLAS uses threads, which wait for one another where the machine is busy.
+DENSE, DENSE_LEAST_SQUARES = 120, 150
 #: Largest residuals of a solution: relative to the terms of their sum, and in the solver's scale.
 EXACT, TINY = 1e-12, 1e-14
 #: Iterations of a method that converges quadratically.
@@ -75,6 +76,10 @@ class NewtonSystem:
     def _sparse(self, entries, residual):
         m, n = self._shape
         M = sparse.csc_matrix((entries, (self._i, self._j)), shape=(m, n))
+        M.eliminate_zeros()
+        if structural_rank(M) < n:
+            # SuperLU may write beyond its memory
+            return None
         try:
             return _least_squares(M, residual) if m > n else splu(M).solve(residual)
         except RuntimeError:

@@ -43,3 +43,12 @@ def test_least_squares_refuse_columns_that_depend_on_one_another(n, scale):
 def test_inconsistent_systems_have_no_solution(n):
     rng = np.random.default_rng(n)
     assert solution(rng.normal(size=(n + 3, n)), rng.normal(size=n + 3)) is None
+
+
+@pytest.mark.parametrize('surplus', [0, 3])
+def test_an_unknown_without_an_entry_is_refused_in_a_large_system(surplus):
+    """SuperLU may abort the process there."""
+    n = max(DENSE, DENSE_LEAST_SQUARES) + 10
+    M = np.random.default_rng(0).normal(size=(n + surplus, n))
+    M[:, 1] = 0
+    assert solution(M, M @ np.ones(n)) is None

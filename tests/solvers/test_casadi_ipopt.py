@@ -276,7 +276,7 @@ def test_too_many_equations_are_named(solver):
     'add, message',
     [
         (lambda m: Complementarity(expr=complements(m.x[1] >= 0, m.x[2] >= 0)), 'use mpec_hybrid'),
-        (lambda m: pyo.Var(domain=pyo.Binary), 'casadi_ipopt does not decide integers'),
+        (lambda m: pyo.Var(domain=pyo.Binary), 'an integer variable, which casadi_ipopt does not decide'),
         (lambda m: pyo.Objective(expr=m.x[1]), '2 active objectives'),
         (lambda m: pyo.Constraint(expr=pyo.asinh(m.x[1]) <= 1), "'asinh' cannot be evaluated"),
     ],
