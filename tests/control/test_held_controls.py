@@ -1,12 +1,42 @@
-"""Held controls as starts: no plan gets worse by them, the best is found, controls without bounds are refused."""
+"""Held controls as starts: a poor local plan is left, controls without bounds are refused."""
 
 import mpc_heater
+import mpc_tank
 import pyomo.environ as pyo
 import pytest
 
 from pyomo_fesd import Controller, FesdError, simulate
 from pyomo_fesd.control.held_controls import HeldControls
 from tests.problems import controlled_ramp
+
+#: Step 40 of the loop of the tank with seed 1: the level is at the outlet, and the pressure too high.
+MEASURED, FEEDS, CLOSING = {'M_G': 7.195, 'M_L': 250.0}, {'F_L': 2.778, 'F_G': 0.0924}, (0.0797, 0.0776, 0.0757, 0.0739, 0.0721)
+
+
+def second_plan(levels):
+    """Answer after a plan whose level stays a little above the outlet."""
+    m = mpc_tank.control_problem()
+    controller = mpc_tank.control(m, levels=levels)
+    for name, number in (MEASURED | {'M_L': 250.2}).items():
+        m.component(name)[0].set_value(number)
+    for name, number in FEEDS.items():
+        m.component(name).set_value(number)
+    for t in m.t:
+        if t > 0:
+            m.u[t].set_value(CLOSING[min(int((t - 1e-9) / mpc_tank.INTERVAL), mpc_tank.STAGES - 1)])
+    simulate(m, m.t, inputs=[m.u])
+    controller._has_plan = True
+    return m, controller.step({m.component(name): number for name, number in MEASURED.items()})
+
+
+def test_levels_leave_a_local_plan_that_keeps_the_pressure_far_too_high():
+    _, poor = second_plan(levels=None)
+    m, answer = second_plan(levels=5)
+    assert poor.certified and poor.objective > 20
+    assert answer.certified and answer.objective < 1
+    found = {t: m.P[t].value for t in (2, 4, 10)}
+    simulate(m, m.t, inputs=[m.u])
+    assert {t: m.P[t].value for t in found} == pytest.approx(found, rel=1e-3)
 
 
 def test_levels_never_make_the_plan_worse_and_hold_within_a_deadline():
