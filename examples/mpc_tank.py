@@ -184,10 +184,11 @@ class Disturbances:
         return self.feeds
 
 
-def control(problem, rise=None):
-    """Build the controller; with ``rise`` a worse plan is not taken unquestioned."""
+def control(problem, rise=None, levels=None):
+    """Build the controller; ``rise`` and ``levels`` question the shifted plan."""
     changing = [problem.P_ref, problem.F_L, problem.F_G]
-    return pyomo_fesd.Controller(problem, [problem.u], changing, rise=rise)
+    questions = {'rise': rise, 'levels': levels}
+    return pyomo_fesd.Controller(problem, [problem.u], changing, **questions)
 
 
 def loop(steps=60, seed=0, time_limit=None, build=control_problem, control=control):

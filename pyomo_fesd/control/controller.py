@@ -6,6 +6,7 @@ A step shifts the plan of the step before, loads what was measured, and tries, a
 2. the branch of a simulation from the measured state with the shifted controls, which has the modes that the plant will have;
 3. the full run: the homotopy.
 
+With ``levels`` the objective found is compared with those of some simulations (``held_controls``), and a better one is a start.
 The first certified solution is the answer; without one the best feasible point; without any the shifted plan itself.
 
 Takes: a model on a moving grid, compiled once.
@@ -25,6 +26,7 @@ from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct
 
 from pyomo_fesd.control.control_step import BRANCH, DEADLINE, FULL, PLAN, SIMULATED, ControlStep
+from pyomo_fesd.control.held_controls import HeldControls
 from pyomo_fesd.control.moving_interface import MovingModelInterface
 from pyomo_fesd.control.states import first_states
 from pyomo_fesd.core import FesdError, interruptible, is_indexed_by
@@ -56,6 +58,9 @@ class Controller:
     rise : float, optional
         where the objective of a new plan is above that of the plan before by more than this part, the homotopy is tried as well,
         and the better one kept: the shifted branch may hold a local solution that a disturbance has made poor
+    levels : int, optional
+        at each step the model is simulated with the controls held over the horizon at so many levels between their bounds; where
+        the best of them has a better objective than the new plan, its branch is solved too, and the better plan kept
     options : options of ``mpec_hybrid`` for every solve
 
     Attributes
@@ -66,7 +71,8 @@ class Controller:
     Raises
     ------
     FesdError
-        as ``set_instance`` and ``MovingModelInterface``, and for controls that are not variables over time
+        as ``set_instance`` and ``MovingModelInterface``, and for controls that are not variables over time; with ``levels``, for
+        fewer than two and for controls without two bounds
     """
 
     def __init__(
@@ -76,6 +82,7 @@ class Controller:
         parameters: Iterable = (),
         wrt: ContinuousSet | None = None,
         rise: float | None = None,
+        levels: int | None = None,
         **options,
     ):
         self.interface = MovingModelInterface(model, wrt)
@@ -83,6 +90,7 @@ class Controller:
         self._options = {'review': False} | options
         self._solver, self._has_plan = SolverFactory('mpec_hybrid'), False
         self._rise, self._objective = rise, None
+        self._held = None if levels is None else HeldControls(model, self._controls, self.interface.time, levels)
         self._variables = list(model.component_data_objects(Var, descend_into=(Block, Disjunct)))
         given = [*first_states(model, self.interface.time), *self.interface.mode_multipliers, *parameters]
         self._solver.set_instance(model, parameters=given, **options)
@@ -129,9 +137,21 @@ class Controller:
         self.interface.load_modes(modes)
         search = _Search(self, deadline)
         search.run(ATTEMPTS if self._has_plan else ATTEMPTS[1:], thorough)
+        if self._held is not None and not deadline.expired():
+            self._search_from_held(search)
         if thorough or self._has_risen(search.best):
             search.run([HOMOTOPY], True)
         return search
+
+    def _search_from_held(self, search):
+        """Solve the branch of the best simulation with held controls, where it is better than what was found."""
+        start = self.values()
+        objective, level = self._held.best(self._objective_component())
+        self.load(start)
+        found = None if search.best is None else search.best.incumbent_objective
+        if level is not None and (found is None or self.sense * (objective - found) < 0):
+            self._held.hold(level)
+            search.run(ATTEMPTS[1:], True)
 
     def present_controls(self) -> ScalarData:
         """Return the controls of the first control stage that the model has now, within their bounds."""
@@ -149,7 +169,10 @@ class Controller:
     @property
     def sense(self) -> int:
         """1 where the objective is minimised, -1 where it is maximised."""
-        return int(next(self._model.component_data_objects(Objective, active=True)).sense)
+        return int(self._objective_component().sense)
+
+    def _objective_component(self):
+        return next(self._model.component_data_objects(Objective, active=True))
 
     def solve(self, options: dict, time_limit: float | None):
         """Solve from the present values; returns Pyomo's results."""

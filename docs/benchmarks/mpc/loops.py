@@ -16,7 +16,8 @@ SEED = 1
 DEADLINES = {'tank': 10.0, 'heater': 15.0, 'idaes': 30.0}
 EXAMPLES = {'tank': 'mpc_tank', 'heater': 'mpc_heater', 'idaes': 'idaes_mpc'}
 METHODS = (
-    *(('tank', 'pyomo_fesd'), ('tank', 'pyomo_fesd, rise=0.1'), ('tank', 'smoothed on a fixed grid'), ('tank', 'nosnoc 0.2.0')),
+    *(('tank', 'pyomo_fesd'), ('tank', 'pyomo_fesd, rise=0.1'), ('tank', 'pyomo_fesd, levels=5')),
+    *(('tank', 'smoothed on a fixed grid'), ('tank', 'nosnoc 0.2.0')),
     *(('heater', 'pyomo_fesd'), ('heater', 'smoothed on a fixed grid')),
     *(('idaes', 'pyomo_fesd'), ('idaes', 'smoothed on a fixed grid')),
 )
@@ -76,6 +77,10 @@ def _with_rise(plant, example):
     return {'control': partial(example.control, rise=0.1)}
 
 
+def _with_levels(plant, example):
+    return {'control': partial(example.control, levels=5)}
+
+
 def _smoothed(plant, example):
     from benchmarks.mpc import smoothed  # needs IDAES
 
@@ -98,6 +103,7 @@ def _nosnoc(plant, example):
 CONTROLS = {
     'pyomo_fesd': _own,
     'pyomo_fesd, rise=0.1': _with_rise,
+    'pyomo_fesd, levels=5': _with_levels,
     'smoothed on a fixed grid': _smoothed,
     'nosnoc 0.2.0': _nosnoc,
 }

@@ -24,7 +24,7 @@ HERE = Path(__file__).parent
 #: Seconds for one loop.
 LIMIT = 2400
 #: Lines of the other methods.
-COLORS = {'pyomo_fesd, rise=0.1': 'C7', 'smoothed on a fixed grid': '0.7', 'nosnoc 0.2.0': 'k'}
+COLORS = {'pyomo_fesd, levels=5': 'C8', 'pyomo_fesd, rise=0.1': 'C7', 'smoothed on a fixed grid': '0.7', 'nosnoc 0.2.0': 'k'}
 #: Steps that all loops have made.
 COMMON = 25
 ORIGINS = ('branch', 'simulated branch', 'full run', 'deadline', 'plan')
@@ -32,7 +32,7 @@ ORIGINS = ('branch', 'simulated branch', 'full run', 'deadline', 'plan')
 
 def file_of(plant, method):
     """The file of the steps of one loop."""
-    name = method.split(' on ')[0].replace(', ', '_').replace(' 0.2.0', '').replace('=0.1', '')
+    name = method.split(' on ')[0].replace(', ', '_').replace(' 0.2.0', '').replace('=0.1', '').replace('=5', '')
     return HERE / f'steps_{plant}_{name}.csv'
 
 
