@@ -138,15 +138,15 @@ class Controller:
         search = _Search(self, deadline)
         search.run(ATTEMPTS if self._has_plan else ATTEMPTS[1:], thorough)
         if self._held is not None and not deadline.expired():
-            self._search_from_held(search)
+            self._search_from_held(search, deadline)
         if thorough or self._has_risen(search.best):
             search.run([HOMOTOPY], True)
         return search
 
-    def _search_from_held(self, search):
+    def _search_from_held(self, search, deadline):
         """Solve the branch of the best simulation with held controls, where it is better than what was found."""
         start = self.values()
-        objective, level = self._held.best(self._objective_component())
+        objective, level = self._held.best(self._objective_component(), deadline)
         self.load(start)
         found = None if search.best is None else search.best.incumbent_objective
         if level is not None and (found is None or self.sense * (objective - found) < 0):

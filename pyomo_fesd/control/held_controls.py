@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from pyomo.core import Block, Var, value
 
 from pyomo_fesd.core import FesdError
+from pyomo_fesd.mpcc import Deadline
 from pyomo_fesd.simulation import simulate
 
 
@@ -44,9 +45,10 @@ class HeldControls:
         self._model, self._controls, self._wrt = model, controls, wrt
         self._levels = [k / (number - 1) for k in range(number)]
 
-    def best(self, objective) -> tuple[float | None, float | None]:
-        """Return the objective of the best simulation and its level; (None, None) if none can be simulated."""
-        found = [(reached, level) for level in self._levels if (reached := self._simulated(level, objective)) is not None]
+    def best(self, objective, deadline: Deadline) -> tuple[float | None, float | None]:
+        """Return the objective of the best simulation before the deadline and its level; (None, None) if there is none."""
+        reached = ((self._simulated(level, objective, deadline), level) for level in self._levels)
+        found = [pair for pair in reached if pair[0] is not None]
         return min(found, key=lambda pair: objective.sense * pair[0], default=(None, None))
 
     def hold(self, level: float) -> None:
@@ -55,10 +57,12 @@ class HeldControls:
             low, high = v.bounds
             v.set_value(low + level * (high - low))
 
-    def _simulated(self, level, objective):
+    def _simulated(self, level, objective, deadline):
+        if deadline.expired():
+            return None
         self.hold(level)
         try:
-            simulate(self._model, self._wrt, inputs=self._controls)
+            simulate(self._model, self._wrt, inputs=self._controls, time_limit=deadline.left())
         except FesdError:
             return None  # e.g. a state that leaves the range of an equation: no start
         return value(objective)

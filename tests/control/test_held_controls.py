@@ -7,6 +7,7 @@ import pytest
 
 from pyomo_fesd import Controller, FesdError, simulate
 from pyomo_fesd.control.held_controls import HeldControls
+from pyomo_fesd.mpcc import Deadline
 from tests.problems import controlled_ramp
 
 #: Step 40 of the loop of the tank with seed 1: the level is at the outlet, and the pressure too high.
@@ -51,9 +52,16 @@ def test_levels_never_make_the_plan_worse_and_hold_within_a_deadline():
     assert Controller(m, [m.u], [m.goal], levels=4).step(time_limit=0).origin == 'plan'
 
 
+def test_nothing_is_simulated_after_the_deadline():
+    m = controlled_ramp.control_problem()
+    before = {t: m.u[t].value for t in m.t}
+    assert HeldControls(m, [m.u], m.t, 3).best(m.cost, Deadline.after(0)) == (None, None)
+    assert {t: m.u[t].value for t in m.t} == before
+
+
 def test_the_best_level_is_that_of_simulations_one_by_one():
     m = controlled_ramp.control_problem()
-    objective, level = HeldControls(m, [m.u], m.t, 5).best(m.cost)
+    objective, level = HeldControls(m, [m.u], m.t, 5).best(m.cost, Deadline())
     found = []
     for k in range(5):
         for t in m.t:
