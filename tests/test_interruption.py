@@ -1,5 +1,6 @@
 """Ctrl-C at random times: the model is as it was, no folder is left behind, and nothing turns it into another error."""
 
+import gc
 import os
 import random
 import signal
@@ -241,3 +242,17 @@ def test_other_threads_have_no_signals():
     thread.start()
     thread.join()
     assert answers == [False]
+
+
+def test_a_context_whose_entry_was_interrupted_does_not_touch_later_signals():
+    """Ctrl-C in the last line of the entry of ``raising``: its generator is deleted at any later time."""
+    before = signal.getsignal(signal.SIGINT)
+    with DeferredInterrupt() as interrupt:
+        entered = interrupt.raising()
+        entered.__enter__()
+    assert signal.getsignal(signal.SIGINT) is before
+    del entered
+    gc.collect()
+    assert signal.getsignal(signal.SIGINT) is before
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)

@@ -38,10 +38,14 @@ class DeferredInterrupt:
         return self
 
     def __exit__(self, kind, error, trace):
-        if self._handler is not None:
+        handler = self._handler
+        if handler is not None:
             _open.remove(self)
-            signal.signal(signal.SIGINT, self._handler)
-            self._answer()
+            try:
+                signal.signal(signal.SIGINT, handler)
+            finally:
+                self._handler = None
+            self._answer(handler)
 
     def _remember(self, *args):
         self.pressed = True
@@ -53,10 +57,10 @@ class DeferredInterrupt:
             self._raised = error
             raise
 
-    def _answer(self):
+    def _answer(self, handler):
         if self.pressed:
             self.pressed = False
-            self._handler(signal.SIGINT, None)
+            handler(signal.SIGINT, None)
 
     @contextmanager
     def raising(self) -> Iterator[None]:
@@ -69,14 +73,19 @@ class DeferredInterrupt:
             return
         try:
             signal.signal(signal.SIGINT, self._raise)
-            self._answer()
+            self._answer(self._handler)
             yield
         finally:
-            signal.signal(signal.SIGINT, self._remember)
-            raised, self._raised = self._raised, None
-            if raised is not None:
-                raise raised
-            self._answer()
+            # where Ctrl-C fell into the entry of this context, the outer one has ended long before this generator is deleted
+            if self._handler is not None:
+                self._end_of_raising()
+
+    def _end_of_raising(self):
+        signal.signal(signal.SIGINT, self._remember)
+        raised, self._raised = self._raised, None
+        if raised is not None:
+            raise raised
+        self._answer(self._handler)
 
 
 def interruptible(function: Callable) -> Callable:
