@@ -23,7 +23,7 @@ IPOPT = {
     'least_square_init_duals': 'yes',
     # MUMPS' own permutation for scaling takes most of the time on these systems without a gain
     'mumps_permuting_scaling': 0,
-    # approximate minimum degree: a tenth to a fifth of the time below MUMPS' own choice of an ordering, where large
+    # approximate minimum degree: quicker than MUMPS' own choice of an ordering on large systems of this kind
     'mumps_pivot_order': 0,
     # dependent constraints are the rule here: G = 0 and H = 0 both follow where a pair is bi-active
     'perturb_always_cd': 'yes',
