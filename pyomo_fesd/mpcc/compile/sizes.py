@@ -90,8 +90,8 @@ def row_factors(jacobians: Sequence, given: np.ndarray) -> np.ndarray:
 
 
 def _factors(sizes, mild):
-    """1/size as a power of 2; 1 for mild sizes and for those that are unknown."""
-    extreme = np.isfinite(sizes) & (sizes > 0) & ((sizes < mild[0]) | (sizes > mild[1]))
+    """1/size as a power of 2; 1 for mild sizes, for those that are unknown, and where it would be infinite."""
+    extreme = np.isfinite(sizes) & (sizes >= np.finfo(float).tiny) & ((sizes < mild[0]) | (sizes > mild[1]))
     return np.where(extreme, np.exp2(-np.round(np.log2(np.where(extreme, sizes, 1.0)))), 1.0)
 
 

@@ -143,3 +143,9 @@ def test_the_least_of_the_large_gradients_counts_and_a_row_without_a_value_is_ju
     at, near = (sparse.csr_matrix([[entry] for entry in entries]) for entries in ([1e20, 1e9, np.nan], [1.0, 1.01e9, 1e9]))
     s = row_factors([at, near], np.ones(3))
     assert s[0] == 1.0 and s[1:] == pytest.approx(1e-9, rel=0.5)
+
+
+def test_a_row_of_denormal_gradients_is_left():
+    """1/size would be infinite."""
+    found = row_factors([sparse.csr_matrix([[5e-324], [1e-300]])], np.ones(2))
+    assert found[0] == 1.0 and np.isfinite(found[1]) and found[1] > 1e299
