@@ -14,7 +14,7 @@ from problems import small_mpccs
 from problems.running import seen, transform
 
 import pyomo_fesd
-from pyomo_fesd.core import DeferredInterrupt, interrupt_handled, interruptible
+from pyomo_fesd.core import DeferredInterrupt, interrupt_handled, interruptible, restored_on_error
 from tests.models import dcs, signum
 
 MPEC_HYBRID = pyo.SolverFactory('mpec_hybrid')
@@ -256,3 +256,23 @@ def test_a_context_whose_entry_was_interrupted_does_not_touch_later_signals():
     assert signal.getsignal(signal.SIGINT) is before
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)
+
+
+def empty(m):
+    with restored_on_error(m):
+        pass
+
+
+def test_a_press_anywhere_in_a_context_leaves_signals_as_they_were():
+    m = signum()
+    lines, before, lost = Press(0), signal.getsignal(signal.SIGINT), 0
+    lines.during(empty, m)
+    for at in range(1, lines.count + 1, 1 + lines.count // 60):
+        press = Press(at)
+        answer = press.during(empty, m)
+        lost += press.pressed and not isinstance(answer, KeyboardInterrupt)
+        del answer
+        gc.collect()
+        assert signal.getsignal(signal.SIGINT) is before, at
+    # pressed in the deletion of a generator after the context
+    assert lost <= 1

@@ -1,11 +1,14 @@
 """Ctrl-C: at once where nothing is lost by it, and after the body where something would be left half done."""
 
+import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 
+#: Frames that are looked at: the present one, a generator's caller, and that of a tracer.
+NEAR = 3
 #: Open contexts of the main thread.
 _open = []
 
@@ -51,6 +54,10 @@ class DeferredInterrupt:
         self.pressed = True
 
     def _raise(self, number, frame):
+        if _is_entry(frame):
+            # a context of a generator that is interrupted there would never be left: the end of the body answers
+            self.pressed = True
+            return
         try:
             self._handler(number, frame)
         except BaseException as error:
@@ -86,6 +93,15 @@ class DeferredInterrupt:
         if raised is not None:
             raise raised
         self._answer(self._handler)
+
+
+def _is_entry(frame):
+    """Whether a context is just being entered or left by contextlib; a tracer may lie between."""
+    for _ in range(NEAR):
+        if frame is not None and frame.f_code.co_filename == contextlib.__file__:
+            return True
+        frame = frame and frame.f_back
+    return False
 
 
 def interruptible(function: Callable) -> Callable:
