@@ -121,7 +121,7 @@ class Controller:
         began, deadline, before = time.perf_counter(), Deadline.after(time_limit), self.values()
         try:
             search = self._searched(measured, modes, deadline, thorough)
-        except Exception:
+        except BaseException:  # Ctrl-C, too, leaves the plan of before
             self.load(before)
             raise
         self._has_plan = self._has_plan or search.best is not None

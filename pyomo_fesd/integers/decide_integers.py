@@ -42,7 +42,7 @@ class IntegerDecision:
     best : int
         its row with the best objective among the certified ones; if none is certified, among all solutions
     complete : bool
-        whether every choice within the bounds has a row, certified or reported infeasible
+        whether every choice within the bounds has a row, certified or reported infeasible (no point was found, which is no proof)
     """
 
     table: pd.DataFrame
@@ -115,7 +115,7 @@ class _Trials:
         self._model, self._integers = model, integers
         variables = model.component_data_objects(Var, descend_into=True)
         self._before = [(v, v.value, v.stale) for v in variables]
-        self._rows, self._solutions, self.best = {}, {}, None
+        self._rows, self._solution, self.best = {}, [], None
         sense = next((o.sense for o in model.component_data_objects(Objective, active=True)), 1)
         self._sign = -1 if sense == maximize else 1
         self._solver = SolverFactory('mpec_hybrid', raise_exception_on_nonoptimal_result=False, **options)
