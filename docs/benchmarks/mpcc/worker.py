@@ -90,7 +90,7 @@ def _compiled(path):
     import mpcc_json
 
     m = mpcc_json.to_pyomo(_load(path))
-    return m, compile_mpcc(read_mpcc(m), HierarchicalTimer())
+    return m, compile_mpcc(read_mpcc(m), HierarchicalTimer(), expanded=True)
 
 
 def _point(d, m, values):

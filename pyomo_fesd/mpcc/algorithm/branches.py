@@ -23,6 +23,8 @@ SHRINK, SHRINKS = 0.1, 3
 #: Ipopt leaves sides without a multiplier at the root of its tolerance.  Those below this count as zero as well, if this descends
 #: clearly: gradients are inexact too.
 NEARLY, CLEAR = 1e-4, 1e-4
+#: HiGHS for an LPEC with a binary for every pair, which proves nothing: a smaller descent is not worth a branch, nor is a long search.
+WIDE = {'mip_abs_gap': 1e-6, 'mip_max_nodes': 100}
 #: With more bi-active pairs than this an LPEC takes long and tells little about the branch.
 SUGGESTED = 50
 #: Trust region of the LPEC that searches for any feasible branch.
@@ -261,7 +263,7 @@ class Branches:
         if point.certificate.grade is not Stationarity.B:
             return None
         better = self._beyond(point, enough, NEARLY, CLEAR)
-        return self._beyond(point, enough, np.inf, 0.0) if better is None and worth and self._global_lpec else better
+        return self._beyond(point, enough, np.inf, 0.0, WIDE) if better is None and worth and self._global_lpec else better
 
     def _step_down(self, point, enough):
         """In the branch of the certificate's direction: from its end, or within ever smaller trust regions."""
@@ -280,12 +282,12 @@ class Branches:
             better = self.certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=self._first)
         return better if _is_below(better, enough) or _settles(better, point) else None
 
-    def _beyond(self, point, enough, tolerance, clear):
+    def _beyond(self, point, enough, tolerance, clear, limits=None):
         """A better point in the branch that the LPEC names if all sides below ``tolerance`` count as zero."""
         sets = self._subsolves.sets(point.w, tolerance)
         if np.count_nonzero(sets.gamma) <= point.certificate.biactive:
             return None
-        step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal)
+        step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal, limits=limits)
         if not step.solved or step.descent <= clear:
             return None
         better = self._point(point.w + step.d, step.zero, None, False)

@@ -104,9 +104,9 @@ def _largest(J, sizes):
     """The largest entry of each row over the sizes, 0 for what cannot be evaluated."""
     if 0 in J.shape:
         return np.zeros(J.shape[0])
-    scaled = J.multiply(sizes).tocsr()
-    scaled.data = np.nan_to_num(np.abs(scaled.data), nan=0.0, posinf=0.0)
-    return scaled.max(axis=1).toarray().ravel()
+    J, largest = J.tocoo(), np.zeros(J.shape[0])
+    np.maximum.at(largest, J.row, np.nan_to_num(np.abs(J.data * sizes[J.col]), nan=0.0, posinf=0.0))
+    return largest
 
 
 def _sizes(c):
@@ -180,7 +180,7 @@ def _bounds(c):
 def _evidence(c):
     """Constant coefficients and right-hand sides of rows and sides, and the coefficients of a quadratic objective."""
     points = _samples(c, np.ones(len(c.x0)))[:2]
-    here, there = [sparse.vstack(J[1:4]).tocsr() for J in map(c.gradients, points)]
+    here, there = [sparse.vstack(J[1:4], format='csr') for J in map(c.gradients, points)]
     at, q = c.evaluate(points[0]), len(c.side_of)
     values = np.concatenate([at.g, at.G, at.H])
     bounds = [np.concatenate([b, np.zeros(q)]) for b in (c.lbg, c.ubg)]
@@ -190,24 +190,25 @@ def _evidence(c):
 
 
 def _linear(here, there, values, bounds, w, cancelling):
-    """(row, variable, none, number) of the coefficients that are equal in two Jacobians, and of what is left in linear rows.
+    """(row, variable, none, number) of the coefficients that are equal in two Jacobians (csr of one pattern), and of what is left
+    in linear rows.
 
     ``cancelling`` are the sizes of terms without variables.
     """
-    n, changed = len(w), abs(here - there).tocoo()
-    changed = sparse.csr_matrix((changed.data != 0, (changed.row, changed.col)), here.shape)
-    fixed = (here - here.multiply(changed)).tocoo()
-    varies = np.asarray(changed.sum(axis=1)).ravel() > 0
-    terms, sizes = here @ w, abs(here) @ np.abs(w) + cancelling
+    n, m, here = len(w), np.arange(len(values)), here.tocoo()
+    changed = here.data != there.data
+    varies = np.bincount(here.row[changed], minlength=len(m)) > 0
+    products = here.data * w[here.col]
+    terms, sizes = np.bincount(here.row, products, len(m)), np.bincount(here.row, np.abs(products), len(m)) + cancelling
     left = values - terms
     left = np.where(np.abs(left) > ROUND_OFF * np.maximum(np.abs(values), sizes), left, 0.0)
     left = np.where(varies, 0.0, left)
     sides = [np.where(np.isfinite(b), b, 0.0) - np.where(np.isfinite(b), left, 0.0) for b in bounds]
     # an equation's right-hand side counts once
     sides[1] = np.where(sides[0] == sides[1], 0.0, sides[1])
-    m = np.arange(len(values))
-    row, first = np.concatenate([fixed.row, m, m]), np.concatenate([fixed.col, np.full(2 * len(m), n)])
-    return row, first, np.full(len(row), n), np.nan_to_num(np.concatenate([fixed.data, *sides]), posinf=0.0, neginf=0.0)
+    row, first = np.concatenate([here.row[~changed], m, m]), np.concatenate([here.col[~changed], np.full(2 * len(m), n)])
+    numbers = np.concatenate([here.data[~changed], *sides])
+    return row, first, np.full(len(row), n), np.nan_to_num(numbers, posinf=0.0, neginf=0.0)
 
 
 def _quadratic(c, row):

@@ -45,16 +45,17 @@ class Descent:
         p = self._p
         y = np.where(np.isneginf(p.low), np.minimum(y, 0.0), y)
         y = np.where(np.isposinf(p.high), np.maximum(y, 0.0), y)
-        products = p.A.multiply(y[:, None]).tocsr()
+        (m, n), A = p.A.shape, p.A.tocoo()
+        entries, products = np.abs(A.data), np.abs(A.data) * np.abs(y)[A.row]
         columns = -_least(p.cost - p.A.T @ y, p.lower, p.upper)
         rows = -_least(y, p.low, p.high)
-        size = (np.abs(p.cost) + np.asarray(abs(products).sum(axis=0)).ravel() + self._curvature(y)) * p.reach
+        size = (np.abs(p.cost) + np.bincount(A.col, products, n) + self._curvature(y)) * p.reach
         floor = FLOOR * self._reach_of_objective()
         by_columns = _ratios(columns, size, floor)
         # a row's term is y_i times its slack: as large as its part in a column, and relative to what the row can move
-        part = abs(products).multiply(p.reach).multiply(1.0 / np.where(size > SMALLEST, size, 1.0)).tocsr()
-        of_rows = part.max(axis=1).toarray().ravel() if part.shape[0] else np.zeros(0)
-        extent = np.abs(y) * (abs(p.A) @ p.reach)
+        of_rows = np.zeros(m)
+        np.maximum.at(of_rows, A.row, products * (p.reach / np.where(size > SMALLEST, size, 1.0))[A.col])
+        extent = np.abs(y) * np.bincount(A.row, entries * p.reach[A.col], m)
         by_rows = _ratios(rows, extent, floor) * np.minimum(of_rows, 1.0)
         return float(max(by_columns.max(initial=0.0), by_rows.max(initial=0.0)))
 

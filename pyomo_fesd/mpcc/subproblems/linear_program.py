@@ -21,6 +21,8 @@ ATTEMPTS = (
 TOLERANCES = ('primal_feasibility_tolerance', 'dual_feasibility_tolerance', 'mip_feasibility_tolerance')
 #: The equilibrated cost has entries up to 1; the defaults (1e-6 and 1e-4) would call d = 0 optimal beside a small descent.
 GAPS = {'mip_abs_gap': 1e-9, 'mip_rel_gap': 1e-6}
+#: d = 0 is a first solution; to search for one takes most of the time of a small program.
+STARTED = {'mip_heuristic_run_feasibility_jump': False}
 ENDED_WELL = (highspy.HighsModelStatus.kOptimal, highspy.HighsModelStatus.kObjectiveTarget)
 LIMITED = (highspy.HighsModelStatus.kSolutionLimit, highspy.HighsModelStatus.kIterationLimit, highspy.HighsModelStatus.kTimeLimit)
 #: Branch and bound ends at a direction with this descent, where the largest entry of the cost descends by 1.
@@ -63,11 +65,10 @@ class Program:
 
 @dataclass(frozen=True)
 class Answer:
-    """A point, the rows' multipliers (positive at lower bounds; None with binaries), and whether the search was cut short."""
+    """A point, and the rows' multipliers (positive at lower bounds; None with binaries)."""
 
     d: np.ndarray
     y: object
-    cut_short: bool
 
 
 def solve(program, options, deadline, start=None, clear=False, limits=None):
@@ -100,7 +101,7 @@ def solve(program, options, deadline, start=None, clear=False, limits=None):
         answer = _answer(highs, p, bool(limits))
         if answer is not None:
             y = None if answer.y is None else answer.y * rows / factor
-            return Answer(answer.d * program.reach, y, answer.cut_short)
+            return Answer(answer.d * program.reach, y)
         if limits:
             return None
     return None
@@ -137,7 +138,7 @@ def _answer(highs, p, limited):
     if not _holds(p, d) or (optimal and not _bounded(highs, p.cost @ d)):
         return None
     y = np.array(solution.row_dual) if not p.binaries and solution.dual_valid else None
-    return Answer(np.clip(d, p.lower, p.upper), y, stopped)
+    return Answer(np.clip(d, p.lower, p.upper), y)
 
 
 def _holds(p, d):
@@ -157,7 +158,7 @@ def _settings(attempt, binaries, clear, deadline, given):
     settings = {'output_flag': False} | {name: value for name, value in attempt.items() if name != 'tolerance'}
     if binaries:
         settings.pop('solver', None)
-        settings |= GAPS | ({'objective_target': -CLEAR_DESCENT} if clear else {})
+        settings |= GAPS | STARTED | ({'objective_target': -CLEAR_DESCENT} if clear else {})
     settings |= dict.fromkeys(TOLERANCES, attempt['tolerance']) | given
     if deadline.at is not None:
         settings['time_limit'] = min(settings.get('time_limit', np.inf), deadline.left())

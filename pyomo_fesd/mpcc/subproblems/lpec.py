@@ -110,10 +110,10 @@ class Lpec:
             left = descent.proved(self._row_multipliers(multipliers, sets, equal))
             if left <= enough:
                 return LpecResult(True, 0.0, np.zeros(len(w)), sets.zero, 0)
-        found, cut_short = self._mixed_integer(sets, at, enough is not None, limits or {})
-        if not found.solved or cut_short or descent.negligible(found.value):
+        found = self._mixed_integer(sets, at, enough is not None, limits)
+        if not found.solved or descent.negligible(found.value):
             return found
-        return self._within_branch(at, sets, found, descent)
+        return self._within_branch(at, sets, found, descent, limits)
 
     def _linearised(self, w, sets, equal, reach, lower, upper):
         c = self._c
@@ -123,22 +123,23 @@ class Lpec:
         alpha, beta, gamma, free = sets.alpha, sets.beta, sets.gamma, sets.open
         low = [np.minimum(c.lbg - at.g, 0.0), 0.0, -H[alpha], 0.0, -G[beta], 0.0, -G[free], -H[free], -G[gamma], -H[gamma]]
         high = [np.maximum(c.ubg - at.g, 0.0), 0.0, np.inf, 0.0, np.inf, 0.0, np.inf, np.inf, np.inf, np.inf]
-        blocks = _blocks(gradients, sets, equal)
-        low, high = (np.concatenate([np.broadcast_to(v, J.shape[0]) for v, J in zip(by, blocks)]) for by in (low, high))
-        program = Program(gradients[0], sparse.vstack(blocks).tocsr(), low, high, lower, upper, reach)
+        places = _places(sets, equal, len(c.lbg))
+        low, high = (np.concatenate([np.broadcast_to(v, len(rows)) for v, rows in zip(by, places)]) for by in (low, high))
+        program = Program(gradients[0], _stacked(gradients)[np.concatenate(places)], low, high, lower, upper, reach)
         return _Linearised(program, equal, G[gamma], H[gamma], J_G[gamma], J_H[gamma])
 
     def _changes(self, w, sets, equal):
         """Changes of the gradient and of the rows along displacements of all variables by their sizes, within their bounds."""
         random, sizes = np.random.default_rng(SEED), _sizes(w)
         here, changes = self._c.gradients(w), []
+        rows, A_here = np.concatenate(_places(sets, equal, len(self._c.lbg))), _stacked(here)
         for _ in range(DISPLACEMENTS):
             step = DISPLACEMENT * sizes * random.choice((-1.0, 1.0), size=len(w))
             within = [(w + s >= self._c.lbx) & (w + s <= self._c.ubx) for s in (step, -step)]
             step = np.where(within[0], step, np.where(within[1], -step, 0.0))
             there = self._c.gradients(w + step)
             cost = np.nan_to_num((there[0] - here[0]) / DISPLACEMENT, posinf=0.0, neginf=0.0)
-            A = sparse.vstack(_blocks([b - a for a, b in zip(here, there)], sets, equal)).tocsr()
+            A = (_stacked(there) - A_here)[rows]
             A.data = np.nan_to_num(A.data / DISPLACEMENT, posinf=0.0, neginf=0.0)
             changes.append((cost, A))
         return changes
@@ -188,17 +189,17 @@ class Lpec:
         answer = solve(program, self._options, self._deadline, start, clear, limits)
         zero = sets.zero.copy()
         if answer is None:
-            return LpecResult(False, 0.0, np.zeros(n), zero, y), True
+            return LpecResult(False, 0.0, np.zeros(n), zero, y)
         zero[sets.gamma] = np.where(answer.d[n:] > 0.5, H_ZERO, G_ZERO)
-        return LpecResult(True, min(float(p.cost @ answer.d[:n]), 0.0), answer.d[:n], zero, y), answer.cut_short
+        return LpecResult(True, min(float(p.cost @ answer.d[:n]), 0.0), answer.d[:n], zero, y)
 
-    def _within_branch(self, at, sets, found, descent):
+    def _within_branch(self, at, sets, found, descent, limits):
         """``found`` with the best direction of its branch and its relative descent, which the multipliers of this LP show."""
         p, chosen, y = at.program, found.zero[sets.gamma], int(sets.gamma.sum())
         high = p.high.copy()
         high[len(high) - 2 * y :] = np.where(np.concatenate([chosen == G_ZERO, chosen == H_ZERO]), 0.0, np.inf)
         branch = replace(p, high=high)
-        answer = solve(branch, self._options, self._deadline)
+        answer = solve(branch, self._options, self._deadline, limits=limits)
         if answer is None or answer.y is None:
             return replace(found, descent=-found.value / float(np.abs(p.cost) @ p.reach))
         value = min(float(p.cost @ answer.d), 0.0)
@@ -211,11 +212,17 @@ def _sizes(w):
     return np.maximum(1.0, np.abs(w))
 
 
-def _blocks(gradients, sets, equal):
-    """The program's rows: own, pairs with G = 0, with H = 0, decisions, open pairs, bi-active pairs."""
-    _, J_g, J_G, J_H, J_equal = gradients
-    sides = [J_G[sets.alpha], J_H[sets.alpha], J_H[sets.beta], J_G[sets.beta]]
-    return [J_g, *sides, J_equal[equal], J_G[sets.open], J_H[sets.open], J_G[sets.gamma], J_H[sets.gamma]]
+def _stacked(gradients):
+    """All rows: own, G, H, decisions."""
+    return sparse.vstack(gradients[1:], format='csr')
+
+
+def _places(sets, equal, m):
+    """The program's rows among all: own (m), pairs with G = 0, with H = 0, decisions, open pairs, bi-active pairs."""
+    G = m + np.arange(len(sets.zero))
+    H, decisions = G + len(G), m + 2 * len(G) + np.flatnonzero(equal)
+    sides = [G[sets.alpha], H[sets.alpha], H[sets.beta], G[sets.beta]]
+    return [np.arange(m), *sides, decisions, G[sets.open], H[sets.open], G[sets.gamma], H[sets.gamma]]
 
 
 def _big_m(J, side, d_low, d_high):
