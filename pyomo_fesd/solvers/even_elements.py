@@ -31,8 +31,8 @@ from pyomo_fesd.core import (
 def even_elements(model: Block, compiled) -> Callable | None:
     """Return a function that shares the elements of a point evenly; None where no grid of the model allows it.
 
-    It takes an array in the units of ``compiled`` (MpccFunctions), and returns another one, or None where all elements are shared so
-    already.
+    It takes an array in the units of ``compiled`` (MpccFunctions), and returns another one, or None where all elements are
+    shared so already.
     """
     grids = [moving for moving in moving_grids(model).values() if _applies(moving)]
     return (lambda w: _shared(model, compiled, grids, w)) if grids else None

@@ -172,15 +172,19 @@ def measure_scaling():
     found = pd.DataFrame(scaling())
     found.to_csv(HERE / 'scaling.csv', index=False, float_format='%.3g')
     print(found.to_string())
-    figure = Figure(figsize=(5, 3.2), layout='constrained')
+    draw_scaling(found).savefig(HERE / 'scaling.png', dpi=150)
+
+
+def draw_scaling(found):
+    """Seconds of each run, with the load before it."""
+    figure = Figure(figsize=(5.5, 3.4), layout='constrained')
     axis = figure.subplots()
-    names = [f'{kind}, {processes}' for kind, processes in zip(found['executor'], found['processes'])]
-    bars = axis.bar(names, found['seconds'])
-    axis.bar_label(bars, [f'{factor:.2f} x' for factor in found['times as fast']])
-    axis.set_xlabel('executor, processes; above: times as fast as one')
-    axis.set_ylabel(f'seconds of {SCALING_NUMBER} scenarios')
-    axis.margins(y=0.12)
-    figure.savefig(HERE / 'scaling.png', dpi=150)
+    bars = axis.bar([f'{kind}, {processes}' for kind, processes in zip(found['executor'], found['processes'])], found['seconds'])
+    axis.bar_label(bars, [f'{row["times as fast"]:.2f} x\nload {row["load"]:.1f}' for _, row in found.iterrows()])
+    axis.set_xlabel('executor, processes; above: times as fast as one process, load before')
+    axis.set_ylabel(f'seconds of {found["scenarios"][0]} scenarios')
+    axis.margins(y=0.2)
+    return figure
 
 
 def review():
