@@ -172,7 +172,7 @@ class Branches:
         if start is None:
             return None
         self._subsolves.note("shared evenly", start)
-        return self._if_more_even(start, self._subsolves.sets(start, self._tolerances.biactive).zero, point)
+        return self._if_more_even(start, self._subsolves.sets(start, self._tolerances.biactive).zero, point, np.inf)
 
     def _is_uneven(self, w):
         c = self._c
@@ -185,24 +185,31 @@ class Branches:
     def _more_even(self, point, tried):
         """A certified solution of a neighbouring branch that is more even; small variables are the first to change sides."""
         candidates = [n for n in self._c.neighbours if n.short.size]
+        enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for neighbour in sorted(candidates, key=lambda n: point.w[n.short].max()):
             zero = self._zero_sides(point, neighbour, always=True)
             if zero is None or zero.tobytes() in tried:
                 continue
             tried.add(zero.tobytes())
-            found = self._if_more_even(point.w, zero, point)
+            found = self._if_more_even(point.w, zero, point, enough)
             if found is not None:
                 return found
         return None
 
-    def _if_more_even(self, start, zero, point):
-        """The certified solution that the branch ``zero`` leads to from ``start``; None if it is not more even than ``point``."""
+    def _if_more_even(self, start, zero, point, worth):
+        """The certified solution that the branch ``zero`` leads to from ``start``; None if it is neither more even than ``point`` nor
+        better.
+
+        An objective may depend on the method's own variables: then its least lies in a branch further on.  The descent goes there
+        from a solution that is not above ``worth``.
+        """
+        size = max(1.0, abs(point.f))
         found = self.certified(start, zero, max_iter=SECOND)
-        if not _is_below(found, point.f + AS_GOOD * max(1.0, abs(point.f))):
+        if not _is_below(found, point.f + AS_GOOD * size):
             return None
-        # an objective may depend on the method's own variables: its least lies in a branch further on
-        found = self._descended(found)
-        return found if found.certificate.certified and self._is_more_even(found.w, point.w) else None
+        found = self._descended(found) if found.f <= worth else found
+        is_better = self._is_more_even(found.w, point.w) or _is_below(found, point.f - PROGRESS * size)
+        return found if found.certificate.certified and is_better else None
 
     def _descended(self, point):
         """The end of the descent from ``point``."""
