@@ -197,8 +197,7 @@ class Branches:
         return None
 
     def _if_more_even(self, start, zero, point, worth):
-        """The certified solution that the branch ``zero`` leads to from ``start``; None if it is neither more even than ``point`` nor
-        better.
+        """The certified solution that the branch ``zero`` leads to from ``start``, if it is more even than ``point``, or better.
 
         An objective may depend on the method's own variables: then its least lies in a branch further on.  The descent goes there
         from a solution that is not above ``worth``.
