@@ -30,6 +30,7 @@ from pyomo_fesd.core.grid import (
     Grid,
     finest_resolution,
     label_decimals,
+    numbers_of_elements,
     read_grid,
     share_elements,
 )

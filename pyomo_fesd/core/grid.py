@@ -2,7 +2,7 @@
 
 import sys
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -193,6 +193,14 @@ def _share_by_length(number, lengths):
     while found.sum() < number:
         found[np.argmax(lengths / found)] += 1
     return found.tolist()
+
+
+def numbers_of_elements(lengths: Sequence[float], total: int) -> list[int]:
+    """Return numbers of elements with the sum ``total``, at least one for each length, that make the longest element shortest."""
+    found = [1] * len(lengths)
+    for _ in range(total - len(lengths)):
+        found[int(np.argmax(np.divide(lengths, found)))] += 1
+    return found
 
 
 def finest_resolution(wrt: ContinuousSet) -> float:

@@ -16,10 +16,10 @@ import numpy as np
 from pyomo.core import Block, Var
 from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import FesdError, TimeIndex, moving_grids
+from pyomo_fesd.core import FesdError, TimeIndex, moving_grids, numbers_of_elements
 from pyomo_fesd.refinement.dense_output import RoundSolution
 from pyomo_fesd.simulation import simulate
-from pyomo_fesd.starts import numbers_of_elements, set_within_bounds
+from pyomo_fesd.starts import set_within_bounds
 
 
 def start_from(model: Block, wrt: ContinuousSet, solution: RoundSolution) -> None:

@@ -11,7 +11,7 @@ from pyomo.core import value
 from pyomo_fesd.core import FesdError
 
 #: Columns of a row besides the scenario's own and the outputs.
-COLUMNS = ('outcome', 'certified', 'objective', 'seconds', 'reason')
+COLUMNS = ('outcome', 'certified', 'objective', 'seconds', 'reason', 'warnings')
 FAILED = 'failed'
 #: A solution counts as one with these.
 SOLUTIONS = (SolutionStatus.optimal, SolutionStatus.feasible)
@@ -52,7 +52,7 @@ class Scenario:
         """Solve; returns whether the model has a solution."""
         if self.solve is not None:
             self.solve(model)
-            row |= {'outcome': 'solved', 'reason': ''}
+            row |= {'outcome': 'solved', 'reason': '', 'warnings': ''}
             return True
         results = SolverFactory('mpec_hybrid').solve(
             model, load_solutions=True, raise_exception_on_nonoptimal_result=False, **self.options
@@ -60,6 +60,8 @@ class Scenario:
         info = results.extra_info
         row |= {'outcome': results.solution_status.name, 'reason': info.reason, 'objective': results.incumbent_objective}
         row['certified'] = results.solution_status is SolutionStatus.optimal
+        # the log of another process is easily lost
+        row['warnings'] = '; '.join(' '.join(message.split()) for message in info.warnings)
         return results.solution_status in SOLUTIONS
 
     @staticmethod

@@ -53,7 +53,8 @@ def sweep(
     pandas.DataFrame
         with the index of ``scenarios``, its columns, and ``outcome`` (``'optimal'``; ``'failed'`` after an exception; ``'not run'``
         where the executor lost the scenario, which is then tried again by the next call), ``certified``, ``objective``,
-        ``seconds``, ``reason``, and a column for each output (empty without a solution)
+        ``seconds``, ``reason``, ``warnings`` (what the review of ``mpec_hybrid`` says of the solution, such as a missed crossing),
+        and a column for each output (empty without a solution)
 
     Raises
     ------
@@ -118,4 +119,4 @@ def _table(rows, columns, scenarios):
     found['certified'] = found['certified'].map(lambda cell: cell is True or cell == 'True').astype(bool)
     for name in ('objective', 'seconds', *columns[len(scenarios.columns) + len(COLUMNS) :]):
         found[name] = pd.to_numeric(found[name])
-    return found.fillna({'reason': '', 'outcome': ''})
+    return found.fillna({'reason': '', 'warnings': '', 'outcome': ''})

@@ -31,6 +31,7 @@ from pyomo_fesd.mpcc import (
     start_value,
 )
 from pyomo_fesd.results import set_indicators
+from pyomo_fesd.solvers.even_elements import even_elements
 from pyomo_fesd.solvers.options import MpecHybridConfig
 from pyomo_fesd.solvers.persistent_model import PersistentModel, persistent_model
 from pyomo_fesd.solvers.plugin import CasadiSolver, LegacyPlugin, deadline, review, with_structure
@@ -130,7 +131,8 @@ class MpecHybrid(CasadiSolver):
                     table.begin(compiled)
                     shared = compiled, config, config.timer, ready.deadline, ready.cache
                     followed = table.row, reporter(config.callback, compiled, started)
-                    setup = Setup(*shared, *followed, start.further(compiled), start.completion(compiled), start.draw(compiled))
+                    starts = start.further(compiled), start.completion(compiled), start.draw(compiled)
+                    setup = Setup(*shared, *followed, *starts, even_elements(model, compiled))
                     solver = (Multistart if config.starts > 1 else HybridSolver)(setup)
                     record.run = solver.run
                     fill_results(results, model, solver.solve(), set_indicators, compiled, names=user_names)

@@ -5,5 +5,5 @@ the elements), ``held_controls``, ``boundary_values`` (state jumps and hysteresi
 values that the table gives).  ``refine`` places its elements with the same functions.
 """
 
-from pyomo_fesd.starts.element_placement import numbers_of_elements, set_within_bounds
+from pyomo_fesd.starts.element_placement import set_within_bounds
 from pyomo_fesd.starts.start_from import start_from

@@ -8,14 +8,12 @@ Leaves: values of the length multipliers, and of lengths of time that are variab
 Does not apply: to control stages with more intervals than elements; their lengths stay as they are.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from pyomo.common.collections import ComponentMap
 from pyomo.core import value
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import FesdError, MovingGrid
+from pyomo_fesd.core import FesdError, MovingGrid, numbers_of_elements
 from pyomo_fesd.starts.time_table import TimeTable
 
 #: A table may reach beyond the horizon by this part of it.
@@ -26,14 +24,6 @@ def set_within_bounds(v, number: float | None) -> None:
     """Set a value within the bounds, unless it is None or nan."""
     if number is not None and not np.isnan(number):
         v.set_value(float(np.clip(number, v.lb, v.ub)) if v.has_lb() or v.has_ub() else float(number), skip_validation=True)
-
-
-def numbers_of_elements(lengths: Sequence[float], total: int) -> list[int]:
-    """Return numbers of elements with the sum ``total``, at least one for each length, that make the longest element shortest."""
-    found = [1] * len(lengths)
-    for _ in range(total - len(lengths)):
-        found[int(np.argmax(np.divide(lengths, found)))] += 1
-    return found
 
 
 def free_durations(moving: MovingGrid, table: TimeTable) -> ComponentMap:

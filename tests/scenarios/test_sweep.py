@@ -44,7 +44,8 @@ def twice(m):
 def test_rows_in_rows_out(executor):
     found = sweep(build, TABLE, {'x': 'x', 'twice': twice}, executor=executor, progress=False)
     assert found.index.tolist() == list('wxyz')
-    assert found.columns.tolist() == ['a', 'b', 'outcome', 'certified', 'objective', 'seconds', 'reason', 'x', 'twice']
+    of_run = ['outcome', 'certified', 'objective', 'seconds', 'reason', 'warnings']
+    assert found.columns.tolist() == ['a', 'b', *of_run, 'x', 'twice']
     assert found['x'].tolist() == pytest.approx(X, abs=1e-6) and found['twice'].tolist() == pytest.approx(
         [2 * x for x in X], abs=1e-6
     )

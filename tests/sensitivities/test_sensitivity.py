@@ -5,6 +5,7 @@ import oscillator
 import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
+from benchmarks.sensitivities.cases import controlled, overflowing, ramp, solved
 from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity, complements
 from scipy.linalg import expm
@@ -13,29 +14,6 @@ import pyomo_fesd
 from pyomo_fesd import FesdError, sensitivity, switches
 
 GRAVITY = 9.81
-
-
-def solved(m, **kwds):
-    """Transform and solve ``m``."""
-    pyo.TransformationFactory('fesd.dcs').apply_to(m)
-    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, wrt=m.t, **kwds)
-    results = pyo.SolverFactory('mpec_hybrid').solve(m)
-    assert results.solver.termination_condition == 'optimal'
-    return m
-
-
-def ramp(x0, surface, slow, fast):
-    """dx = slow below the surface, fast above; Params for all but x0, which is fixed."""
-    m = pyo.ConcreteModel()
-    m.t = dae.ContinuousSet(bounds=(0, 1))
-    m.surface = pyo.Param(initialize=surface, mutable=True)
-    m.slow, m.fast = pyo.Param(initialize=slow, mutable=True), pyo.Param(initialize=fast, mutable=True)
-    m.x = pyo.Var(m.t, initialize=x0)
-    m.dx = dae.DerivativeVar(m.x)
-    m.x[0].fix(x0)
-    rule = lambda m, t: [[m.x[t] <= m.surface, m.dx[t] == m.slow], [m.x[t] >= m.surface, m.dx[t] == m.fast]]  # noqa: E731
-    m.s = Disjunction(m.t, rule=rule)
-    return m
 
 
 @pytest.mark.parametrize('seed', range(4))
@@ -86,42 +64,13 @@ def test_impacts_of_a_bouncing_ball():
 
 
 def test_overflow_time_of_a_tank():
-    # dV = F - k V until V = V_max; then the overflow w keeps it there
-    m = pyo.ConcreteModel()
-    m.t = dae.ContinuousSet(bounds=(0, 2))
-    m.F, m.k, m.most = (pyo.Param(initialize=p, mutable=True) for p in (2.0, 0.5, 1.5))
-    m.V, m.w = pyo.Var(m.t, initialize=0.0), pyo.Var(m.t, initialize=0.0)
-    m.dV = dae.DerivativeVar(m.V)
-    m.V[0].fix(0)
-    m.balance = pyo.Constraint(m.t, rule=lambda m, t: m.dV[t] == m.F - m.k * m.V[t] - m.w[t])
-    m.weir = Complementarity(m.t, rule=lambda m, t: complements(m.w[t] >= 0, m.V[t] <= m.most))
-    solved(m, nfe=6, ncp=3)
+    m = solved(overflowing(2.0, 0.5, 1.5), nfe=6, ncp=3)
     found = sensitivity(m, [m.F, m.k, m.most], [*switches(m), m.V[2], m.w[2]]).to_numpy()
     F, k, most = 2.0, 0.5, 1.5
     rest = 1 - k * most / F
     t_o = -np.log(rest) / k
     assert found[0] == pytest.approx([-most / F**2 / rest, -t_o / k + most / F / k / rest, 1 / F / rest], abs=1e-4)
     assert found[1:] == pytest.approx(np.array([[0, 0, 1], [1, -most, -k]]), abs=1e-7)
-
-
-def controlled(upper):
-    """A control in two stages, a mode on either side of a surface, a goal; the upper bound of the control is a Param."""
-    m = pyo.ConcreteModel()
-    m.t = dae.ContinuousSet(initialize=[0, 1, 2])
-    m.surface, m.slope, m.goal = (pyo.Param(initialize=p, mutable=True) for p in (0.1, 3.0, 1.2))
-    m.most = pyo.Param(initialize=upper, mutable=True)
-    m.x, m.u = pyo.Var(m.t, initialize=-2), pyo.Var(m.t, initialize=0, bounds=(-2, m.most))
-    m.dx = dae.DerivativeVar(m.x)
-    m.x[0].fix(-2)
-    rule = lambda m, t: [  # noqa: E731
-        [m.x[t] <= m.surface, m.dx[t] == m.slope + m.u[t] - 0.3 * m.x[t] * m.u[t]],
-        [m.x[t] >= m.surface, m.dx[t] == 1 + m.u[t]],
-    ]
-    m.s = Disjunction(m.t, rule=rule)
-    m.run = dae.Integral(m.t, wrt=m.t, rule=lambda m, t: m.u[t] ** 2 + 0.1 * m.x[t] ** 2)
-    m.miss = pyo.Expression(expr=(m.x[2] - m.goal) ** 2)
-    m.cost = pyo.Objective(expr=10 * m.miss + m.run)
-    return solved(m, nfe=4, ncp=2, piecewise_constant=[m.u])
 
 
 def by_differences(m, parameters, outputs, eps=1e-4):

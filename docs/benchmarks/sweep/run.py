@@ -1,16 +1,20 @@
 """1,000 scenarios of the tank on two processes, killed in the middle and resumed; and how long one and two processes take.
 
     .venv/bin/pip install distributed
-    .venv/bin/python docs/benchmarks/sweep/run.py
+    .venv/bin/python docs/benchmarks/sweep/run.py               everything but the following two
+    .venv/bin/python docs/benchmarks/sweep/run.py --scaling     needs a machine on which nothing else runs, and two minutes there
+    .venv/bin/python docs/benchmarks/sweep/run.py --review      warnings of the first 200 scenarios and of those that disagree
 
-Writes rows.csv (the scenarios, with the errors against scipy), disagreements.csv, runs.csv (kill and resume), scaling.csv and
-summary.png beside this file.  The sweeps run in processes of their own, each with its workers in one group, which is killed:
+Writes rows.csv (the scenarios, with the errors against scipy), disagreements.csv, runs.csv (kill and resume) and summary.png;
+scaling.csv and scaling.png; review.csv and review_summary.csv, beside this file.  The sweeps of several processes run in processes
+of their own, each with its workers in one group, which is killed:
 
     run.py pool|dask PROCESSES NUMBER PATH
 """
 
 import csv
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -33,9 +37,11 @@ import pyomo_fesd
 
 HERE = Path(__file__).parent
 PROCESSES, KILLED_AT = 2, 400
-SCALING_NUMBER, REPEATS = 20, 1
+SCALING_NUMBER, REVIEWED = 40, 200
 ERRORS = {f'error of {name}': name for name in OUTPUTS}
-COLUMNS = ['scenario', *RANGES, 'outcome', 'certified', 'reason', 'seconds', *OUTPUTS, *ERRORS]
+COLUMNS = ['scenario', *RANGES, 'outcome', 'certified', 'reason', 'warnings', 'seconds', *OUTPUTS, *ERRORS]
+#: Words of the message on a crossing that the elements do not detect.
+MISSED = 'leaves its region between two collocation points'
 
 
 @contextmanager
@@ -113,8 +119,9 @@ def killed_and_resumed(kind, path):
 
 def with_errors(path):
     """The rows of a sweep in the order of the scenarios, with the errors of the outputs against ``reference``."""
-    rows, scenarios = pd.read_csv(path).sort_values('scenario').set_index('scenario'), table()
-    exact = pd.DataFrame([reference(**values) for values in scenarios.to_dict('records')])
+    rows, scenarios = pd.read_csv(path, keep_default_na=False, na_values={name: '' for name in OUTPUTS}), table().to_dict('records')
+    rows = rows.sort_values('scenario').set_index('scenario')
+    exact = pd.DataFrame([reference(**scenarios[number]) for number in rows.index], index=rows.index)
     for column, name in ERRORS.items():
         rows[column] = rows[name] - exact[name]
     # a different number of switches has other first and last ones
@@ -132,14 +139,76 @@ def counts(rows):
 
 
 def scaling():
-    """Seconds of the first scenarios with one and two processes, in turn; 'load' is the number of jobs on the machine before."""
-    for repeat in range(REPEATS):
-        for kind in EXECUTORS:
-            for processes in (1, 2):
-                with tempfile.TemporaryDirectory() as folder:
-                    load = os.getloadavg()[0]
-                    seconds = finish(start(kind, processes, SCALING_NUMBER, Path(folder) / 'rows.csv'))
-                yield {'executor': kind, 'repeat': repeat, 'processes': processes, 'seconds': seconds, 'load': load}
+    """Seconds of the first scenarios with one and two processes.
+
+    'CPU seconds' are those of all processes; 'load' is the number of jobs on the machine before, 0 where it was free.
+    """
+    for kind in EXECUTORS:
+        alone = None
+        for processes in (1, 2):
+            load, before = os.getloadavg()[0], cpu_of_children()
+            with tempfile.TemporaryDirectory() as folder:
+                seconds = finish(start(kind, processes, SCALING_NUMBER, Path(folder) / 'rows.csv'))
+            alone = alone or seconds
+            yield {
+                'executor': kind,
+                'processes': processes,
+                'scenarios': SCALING_NUMBER,
+                'seconds': seconds,
+                'times as fast': alone / seconds,
+                'CPU seconds': cpu_of_children() - before,
+                'load': load,
+            }
+
+
+def cpu_of_children():
+    """CPU seconds of the processes that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def measure_scaling():
+    """Write the table and picture of ``scaling``."""
+    found = pd.DataFrame(scaling())
+    found.to_csv(HERE / 'scaling.csv', index=False, float_format='%.3g')
+    print(found.to_string())
+    draw_scaling(found).savefig(HERE / 'scaling.png', dpi=150)
+
+
+def draw_scaling(found):
+    """Seconds of each run, with the load before it."""
+    figure = Figure(figsize=(5.5, 3.4), layout='constrained')
+    axis = figure.subplots()
+    bars = axis.bar([f'{kind}, {processes}' for kind, processes in zip(found['executor'], found['processes'])], found['seconds'])
+    axis.bar_label(bars, [f'{row["times as fast"]:.2f} x\nload {row["load"]:.1f}' for _, row in found.iterrows()])
+    axis.set_xlabel('executor, processes; above: times as fast as one process, load before')
+    axis.set_ylabel(f'seconds of {found["scenarios"][0]} scenarios')
+    axis.margins(y=0.2)
+    return figure
+
+
+def review():
+    """Write the warnings of some scenarios beside the differences from scipy, and how often both agree."""
+    wrong = [row['scenario'] for row in csv.DictReader((HERE / 'rows.csv').open()) if float(row['error of switches'])]
+    numbers = sorted({*range(REVIEWED), *map(int, wrong)})
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / 'rows.csv'
+        pyomo_fesd.sweep(build, table().loc[numbers], OUTPUTS, path=path, progress=False)
+        rows = pd.read_csv(path)
+        rows['scenario'] = [numbers[position] for position in rows['scenario']]
+        rows.to_csv(path, index=False)
+        rows = with_errors(path)
+    rows['missed crossing'] = rows['warnings'].str.contains(MISSED)
+    rows['other warning'] = (rows['warnings'] != '') & ~rows['missed crossing']
+    kept = ['scenario', 'switches', 'error of switches', 'error of gas at end', 'error of liquid at end', 'missed crossing']
+    rows[[*kept, 'other warning', 'warnings', 'seconds']].to_csv(HERE / 'review.csv', index=False, float_format='%.3g')
+    cases = rows.assign(switches=np.where(rows['error of switches'] == 0, 'as scipy', 'others than scipy'))
+    cases['largest error'] = rows[['error of gas at end', 'error of liquid at end']].abs().max(axis=1)
+    found = cases.groupby(['switches', 'missed crossing', 'other warning']).agg(
+        **{'scenarios': ('scenario', 'size'), 'largest error at end (mol)': ('largest error', 'max')}
+    )
+    found.to_csv(HERE / 'review_summary.csv', float_format='%.2g')
+    print(found.to_string())
 
 
 def disagreements(rows):
@@ -172,7 +241,7 @@ def draw(rows):
 
 
 def main():
-    """Both sweeps, the scaling, tables and picture."""
+    """Both sweeps, tables and picture."""
     runs = []
     for kind in EXECUTORS:
         with tempfile.TemporaryDirectory() as folder:
@@ -187,8 +256,11 @@ def main():
             draw(rows).savefig(HERE / 'summary.png', dpi=150)
     rounded = pd.DataFrame(runs).T.map(lambda cell: f'{cell:.3g}' if isinstance(cell, float) else cell)
     rounded.to_csv(HERE / 'runs.csv', header=False)
-    pd.DataFrame(scaling()).to_csv(HERE / 'scaling.csv', index=False, float_format='%.4g')
 
+
+#: Arguments -> what runs.
+PARTS = {(): main, ('--scaling',): measure_scaling, ('--review',): review}
 
 if __name__ == '__main__':
-    sweep_here(*sys.argv[1:]) if len(sys.argv) > 1 else main()
+    arguments = tuple(sys.argv[1:])
+    PARTS[arguments]() if arguments in PARTS else sweep_here(*arguments)

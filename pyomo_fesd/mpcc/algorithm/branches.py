@@ -53,13 +53,15 @@ class Branches:
     patient : bool
         whether the first attempt at a branch, too, has the iterations of the second one: where points can be completed, branches
         are worth more than further relaxations
+    even : callable or None
+        see ``Setup``
     """
 
-    def __init__(self, subsolves, gap, global_lpec, patient=False):
+    def __init__(self, subsolves, gap, global_lpec, patient=False, even=None):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
         self._attempts, self._solved, self._exhausted = Counter(), {}, {}
-        self._first = SECOND if patient else FIRST
+        self._first, self._even = SECOND if patient else FIRST, even
 
     # called by the algorithm
 
@@ -150,16 +152,29 @@ class Branches:
         self.improve_from(self.certified(point.w, zero, max_iter=SECOND), True)
 
     def even_out(self):
-        """From a certified incumbent with variables above their guide bounds, go to neighbouring branches where they are lower.
+        """From a certified incumbent with variables above their guide bounds, go to branches where they are lower.
 
-        The values of the pairs stay as they are in their order; the method's own variables, free in a solution, are shared evenly.
+        The values of the pairs stay as they are in their order; the method's own variables, free in a solution, are shared evenly:
+        at once if the caller can (``Setup.even``), else from one neighbouring branch to the next.
         """
         point, tried = self.run.point, set()
         if point is None or not point.certificate.certified or not self._is_uneven(point.w):
             return
+        evened = self._evened(point)
+        if evened is not None:
+            self.run.point = evened
+            return
         while point is not None:
             self.run.point = point
             point = self._more_even(point, tried)
+
+    def _evened(self, point):
+        """The solution near the point that the caller makes of this one; None if there is none that is more even."""
+        start = None if self._even is None else self._even(point.w)
+        if start is None:
+            return None
+        self._subsolves.note("shared evenly", start)
+        return self._if_more_even(start, self._subsolves.sets(start, self._tolerances.biactive).zero, point, np.inf)
 
     def _is_uneven(self, w):
         c = self._c
@@ -172,16 +187,37 @@ class Branches:
     def _more_even(self, point, tried):
         """A certified solution of a neighbouring branch that is more even; small variables are the first to change sides."""
         candidates = [n for n in self._c.neighbours if n.short.size]
-        most = point.f + AS_GOOD * max(1.0, abs(point.f))
+        enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for neighbour in sorted(candidates, key=lambda n: point.w[n.short].max()):
             zero = self._zero_sides(point, neighbour, always=True)
             if zero is None or zero.tobytes() in tried:
                 continue
             tried.add(zero.tobytes())
-            found = self.certified(point.w, zero, max_iter=SECOND)
-            if found is not None and found.certificate.certified and found.f <= most and self._is_more_even(found.w, point.w):
+            found = self._if_more_even(point.w, zero, point, enough)
+            if found is not None:
                 return found
         return None
+
+    def _if_more_even(self, start, zero, point, worth):
+        """The certified solution that the branch ``zero`` leads to from ``start``, if it is more even than ``point``, or better.
+
+        An objective may depend on the method's own variables: then its least lies in a branch further on.  The descent goes there
+        from a solution that is not above ``worth``.
+        """
+        size = max(1.0, abs(point.f))
+        found = self.certified(start, zero, max_iter=SECOND)
+        if not _is_below(found, point.f + AS_GOOD * size):
+            return None
+        found = self._descended(found) if found.f <= worth else found
+        is_better = self._is_more_even(found.w, point.w) or _is_below(found, point.f - PROGRESS * size)
+        return found if found.certificate.certified and is_better else None
+
+    def _descended(self, point):
+        """The end of the descent from ``point``."""
+        end = point
+        while point is not None:
+            end, point = point, self._descend(point, True)
+        return end
 
     def _is_more_even(self, w, before):
         return self._unevenness(w) < self._unevenness(before) * (1 - EVENER)

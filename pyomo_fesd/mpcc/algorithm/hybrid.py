@@ -53,7 +53,7 @@ class HybridSolver:
         self._subsolves = Subsolves(setup, Tolerances.of(self._options), self.run)
         self._gap = GapTest(self._options.gap_tol * 1e-2, self._options.gap_tol)
         search, patient = GLOBAL_LPEC_SEARCH[self._options.lpec](self._c), setup.complete is not None
-        self._branches = Branches(self._subsolves, self._gap, search, patient)
+        self._branches = Branches(self._subsolves, self._gap, search, patient, setup.even)
         self._coincidences = Coincidences(self._subsolves, self._branches)
         completes = setup.complete is not None and self._c.has_objective
         self._completions = Completions(setup, self._subsolves, self._branches) if completes else None

@@ -54,6 +54,9 @@ class Setup:
         all other variables solve equations and pairs, whether that was possible for all of them, and a note for the log
     draw : callable or None
         takes the number of a start, from 1; returns a random point (array), instead of ``start_point``
+    even : callable or None
+        takes a point (array); returns one close to the same solution in a branch in which variables with guide bounds are nearly
+        equal, or None
     """
 
     compiled: object
@@ -66,6 +69,7 @@ class Setup:
     further_start: Optional[Callable] = None
     complete: Optional[Callable] = None
     draw: Optional[Callable] = None
+    even: Optional[Callable] = None
 
 
 @dataclass(frozen=True)

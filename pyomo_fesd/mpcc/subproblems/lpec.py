@@ -8,6 +8,9 @@
 with M_i from the row's 1-norm over the trust region, never a global big-M.  d = 0 is feasible by construction: a violation of the
 point is not to be corrected by d.
 
+Where nothing descends, the LPEC is solved once more without the sides of fillings that are positive: their places may lie densely,
+and a pair of the next one would stop a descent that goes on beyond it before it counts.
+
 With multipliers, weak duality comes first: if it shows that even without the binaries no direction descends, no branch has one, and
 HiGHS is not called.
 """
@@ -99,12 +102,20 @@ class Lpec:
         limits : dict, optional
             HiGHS options of this call; when one of them ends the search, the best direction so far is taken
         """
+        found = self._solve(w, sets, Delta, equal, beyond, multipliers, enough, limits, released=False)
+        if enough is None or not self._c.fillings or not found.solved or found.descent > enough:
+            return found
+        further = self._solve(w, sets, Delta, equal, beyond, multipliers, enough, limits, released=True)
+        return further if further.descent > enough else found
+
+    def _solve(self, w, sets, Delta, equal, beyond, multipliers, enough, limits, released):
+        """``solve``, with the positive sides of fillings, or where they are ``released`` without."""
         equal = np.zeros(self._c.equal.numel(), dtype=bool) if equal is None else equal
         reach = Delta * _sizes(w)
         sets = release_followers(sets, self._c.followers, self._c.evaluate(w))
-        lower, upper = self._box(w, sets, reach, beyond)
+        lower, upper = self._box(w, sets, reach, beyond, released)
         sets = without_constant(sets, self._sides, (lower == 0.0) & (upper == 0.0))
-        at = self._linearised(w, sets, equal, reach, lower, upper)
+        at = self._linearised(w, sets, equal, reach, lower, upper, released)
         descent = Descent(at.program, lambda: self._changes(w, sets, equal))
         if multipliers is not None and enough is not None:
             left = descent.proved(self._row_multipliers(multipliers, sets, equal))
@@ -115,13 +126,15 @@ class Lpec:
             return found
         return self._within_branch(at, sets, found, descent, limits)
 
-    def _linearised(self, w, sets, equal, reach, lower, upper):
+    def _linearised(self, w, sets, equal, reach, lower, upper, released):
         c = self._c
         at, gradients = c.evaluate(w), c.gradients(w)
         _, _, J_G, J_H, _ = gradients
         G, H = np.maximum(at.G, 0.0), np.maximum(at.H, 0.0)
         alpha, beta, gamma, free = sets.alpha, sets.beta, sets.gamma, sets.open
-        low = [np.minimum(c.lbg - at.g, 0.0), 0.0, -H[alpha], 0.0, -G[beta], 0.0, -G[free], -H[free], -G[gamma], -H[gamma]]
+        filled = _pairs_of(c.fillings if released else (), c.pairs)
+        other_H, other_G = (np.where(filled[kind], -np.inf, -side[kind]) for kind, side in ((alpha, H), (beta, G)))
+        low = [np.minimum(c.lbg - at.g, 0.0), 0.0, other_H, 0.0, other_G, 0.0, -G[free], -H[free], -G[gamma], -H[gamma]]
         high = [np.maximum(c.ubg - at.g, 0.0), 0.0, np.inf, 0.0, np.inf, 0.0, np.inf, np.inf, np.inf, np.inf]
         places = _places(sets, equal, len(c.lbg))
         low, high = (np.concatenate([np.broadcast_to(v, len(rows)) for v, rows in zip(by, places)]) for by in (low, high))
@@ -144,11 +157,13 @@ class Lpec:
             changes.append((cost, A))
         return changes
 
-    def _box(self, w, sets, reach, beyond):
+    def _box(self, w, sets, reach, beyond, released):
         """Bounds of d: the trust region; 0 for the variables of a side that is zero because they are at their bounds."""
         c = self._c
         free = c.guided & beyond
         lbx, ubx = np.where(free, -np.inf, c.lbx), np.where(free, np.inf, c.ubx)
+        inside = _inner_shares(c.fillings if released else (), sets.gamma)
+        lbx[inside], ubx[inside] = -np.inf, np.inf
         lower, upper = np.minimum(np.maximum(-reach, lbx - w), 0.0), np.maximum(np.minimum(reach, ubx - w), 0.0)
         settled = np.concatenate([sets.alpha, sets.beta]) & (self._sides.row_of < 0)
         still = self._sides.fixings[np.flatnonzero(settled)].indices
@@ -223,6 +238,23 @@ def _places(sets, equal, m):
     H, decisions = G + len(G), m + 2 * len(G) + np.flatnonzero(equal)
     sides = [G[sets.alpha], H[sets.alpha], H[sets.beta], G[sets.beta]]
     return [np.arange(m), *sides, decisions, G[sets.open], H[sets.open], G[sets.gamma], H[sets.gamma]]
+
+
+def _pairs_of(fillings, number):
+    """Which of the pairs belong to fillings."""
+    found = np.zeros(number, dtype=bool)
+    for filling in fillings:
+        found[filling.pairs] = True
+    return found
+
+
+def _inner_shares(fillings, gamma):
+    """The shares beside which no pair is bi-active."""
+    found = [np.zeros(0, dtype=int)]
+    for filling in fillings:
+        near = gamma[filling.pairs]
+        found.append(filling.shares[~(np.append(near, False) | np.append(False, near))])
+    return np.concatenate(found)
 
 
 def _big_m(J, side, d_low, d_high):
