@@ -80,10 +80,12 @@ def plant():
     return pyomo_fesd.Plant(m, [m.fs.pid.setpoint])
 
 
-def control(problem):
-    """Build the controller."""
+def control(problem, levels=None):
+    """Build the controller; with ``levels`` it tries held controls too."""
     fs = problem.fs
-    return pyomo_fesd.Controller(problem, [fs.pid.setpoint], [fs.reference])
+    return pyomo_fesd.Controller(
+        problem, [fs.pid.setpoint], [fs.reference], levels=levels
+    )
 
 
 def loop(steps=24, seed=0, time_limit=10, build=control_problem, control=control):

@@ -110,9 +110,9 @@ def price(interval):
     return DEAR if interval // HALF_DAY % 2 else CHEAP
 
 
-def control(problem):
-    """Build the controller."""
-    return pyomo_fesd.Controller(problem, [problem.v], [problem.price])
+def control(problem, levels=None):
+    """Build the controller; with ``levels`` it tries held controls too."""
+    return pyomo_fesd.Controller(problem, [problem.v], [problem.price], levels=levels)
 
 
 def loop(steps=48, seed=0, time_limit=10, build=control_problem, control=control):

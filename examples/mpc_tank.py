@@ -204,7 +204,7 @@ def loop(steps=60, seed=0, time_limit=None, build=control_problem, control=contr
             losses.append(pyo.value(real.model.loss))
             feeds = estimator(
                 {'M_G': real.model.M_G[0].value, 'M_L': real.model.M_L[0].value},
-                problem.u[INTERVAL].value,
+                real.model.u[INTERVAL].value,
             )
             for name, feed in feeds.items():
                 problem.component(name).set_value(feed)

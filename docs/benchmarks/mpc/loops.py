@@ -18,8 +18,8 @@ EXAMPLES = {'tank': 'mpc_tank', 'heater': 'mpc_heater', 'idaes': 'idaes_mpc'}
 METHODS = (
     *(('tank', 'pyomo_fesd'), ('tank', 'pyomo_fesd, rise=0.1'), ('tank', 'pyomo_fesd, levels=5')),
     *(('tank', 'smoothed on a fixed grid'), ('tank', 'nosnoc 0.2.0')),
-    *(('heater', 'pyomo_fesd'), ('heater', 'smoothed on a fixed grid')),
-    *(('idaes', 'pyomo_fesd'), ('idaes', 'smoothed on a fixed grid')),
+    *(('heater', 'pyomo_fesd'), ('heater', 'pyomo_fesd, levels=5'), ('heater', 'smoothed on a fixed grid')),
+    *(('idaes', 'pyomo_fesd'), ('idaes', 'pyomo_fesd, levels=5'), ('idaes', 'smoothed on a fixed grid')),
 )
 
 

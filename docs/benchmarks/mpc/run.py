@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 HERE = Path(__file__).parent
 #: Seconds for one loop.
-LIMIT = 2400
+LIMIT = 5400
 #: Lines of the other methods.
 COLORS = {'pyomo_fesd, levels=5': 'C8', 'pyomo_fesd, rise=0.1': 'C7', 'smoothed on a fixed grid': '0.7', 'nosnoc 0.2.0': 'k'}
 #: Steps that all loops have made.
