@@ -160,7 +160,7 @@ class Controller:
             else:
                 self._unprepared = answer.reason
         except FesdError as error:
-            self._unprepared = str(error)
+            self._unprepared = str(error).splitlines()[0]
         return answer
 
     def _measure(self, measured, modes):

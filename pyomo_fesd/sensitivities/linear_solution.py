@@ -19,6 +19,9 @@ from pyomo_fesd.core import FesdError
 from pyomo_fesd.sensitivities.active_rows import NEAR
 from pyomo_fesd.sensitivities.branch_system import BESIDE, BranchSystem
 
+#: A parameter that differs by less, relative, has not changed: a plant that slides along a surface is measured on it to round-off.
+SAME = 1e-6
+
 
 class LinearSolution:
     """The present solution of a compiled model as a linear function of its parameters.
@@ -57,6 +60,7 @@ class LinearSolution:
             naming what would leave the branch, and a parameter by which there is no derivative
         """
         change = self._c.parameters - self._p
+        change[np.abs(change) <= SAME * np.maximum(1.0, np.abs(self._p))] = 0.0
         missing = np.flatnonzero(~self._exists & (change != 0))
         if missing.size:
             raise FesdError(self._parameters[missing[0]], "the solution has no derivative by it", BESIDE)
