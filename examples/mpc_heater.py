@@ -110,7 +110,7 @@ def price(interval):
     return DEAR if interval // HALF_DAY % 2 else CHEAP
 
 
-def control(problem, levels=None):
+def control(problem, levels=5):
     """Build the controller; with ``levels`` it tries held controls too."""
     return pyomo_fesd.Controller(problem, [problem.v], [problem.price], levels=levels)
 
