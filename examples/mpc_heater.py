@@ -168,7 +168,7 @@ def draw(real, steps):
         rate.plot(some.index, some['v'], '.', color=f'C{number}', label=origin)
     rate.set_ylabel('rate of the band (°C/h)')
     rate.set_xlabel('time (h)')
-    rate.legend()
+    rate.legend(loc='lower right', bbox_to_anchor=(1, 1), ncols=4, frameon=False)
     figure.savefig(PICTURE, dpi=150)
 
 

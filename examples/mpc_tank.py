@@ -284,7 +284,7 @@ def draw(real, steps):
         valve.plot(some.index, some['u'], '.', color=f'C{number}', label=origin)
     valve.set_ylabel('valve (mol/(s atm))')
     valve.set_xlabel('time (s)')
-    valve.legend()
+    valve.legend(loc='lower right', bbox_to_anchor=(1, 1), ncols=4, frameon=False)
     figure.savefig(PICTURE, dpi=150)
 
 

@@ -151,6 +151,7 @@ class Controller:
         FesdError
             as ``step``
         """
+        self._prepared, self._unprepared = None, ''
         answer = self.step(time_limit=time_limit)
         self._is_moved = True
         try:

@@ -149,3 +149,11 @@ def test_a_loop_with_advanced_steps_reaches_its_goal():
     table = pyomo_fesd.receding_horizon(controller, plant, 8, time_limit=20, advanced=True)
     assert 'correction' in set(table['origin']) and (table['origin'] != 'plan').all()
     assert (table['prepared'] > 0).all() and plant.trajectory()['x'].iloc[-1] == pytest.approx(0.5, abs=0.15)
+
+
+def test_a_plan_that_is_prepared_twice_is_moved_once():
+    m, controller = prepared()
+    planned = m.u[1.0].value
+    assert controller.prepare().certified and m.x[0].value == pytest.approx(-0.6)
+    assert m.u[1.0].value == pytest.approx(planned)
+    assert controller.step({m.x: -0.6}).origin == 'correction'

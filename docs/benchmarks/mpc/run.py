@@ -51,6 +51,7 @@ def summary(plant, method, table):
     row[f'median CPU ms, first {COMMON}'] = 1e3 * table['cpu'][:COMMON].median()
     if 'cpu of preparation' in table:
         row['median CPU ms, preparation'] = 1e3 * table['cpu of preparation'].median()
+        row['median CPU ms, corrections'] = 1e3 * table['cpu'][table['origin'] == 'correction'].median()
     in_branch = table[(table['origin'] == 'branch') & (table['ipopt'] > 0)]
     for name, part in (('branch', in_branch), ('all', table[table['ipopt'] > 0])):
         row[f'CPU / Ipopt, {name}'] = (part['cpu'] / part['ipopt']).median() if len(part) else None
