@@ -35,8 +35,8 @@ U_RANGE, U_REF = (0.02, 0.2), 0.1  # mol/(s atm)
 WEIGHT_P, WEIGHT_U = 0.05, 20.0
 VALVE = 0.93  # of the plant, relative to the model
 PAST = 4  # intervals of the estimator
-POOR = 1.0  # misfit above which other fits are tried
-GUESSES = [{'F_L': 2.5 * share, 'F_G': 0.1} for share in (0.6, 1.0, 1.4)]
+POOR = 5.0  # misfit above which another fit is tried
+GUESSES = [FEEDS | {'F_L': share * FEEDS['F_L']} for share in (0.6, 1.0, 1.4)]
 REFERENCES = (30.0, 24.0)  # atm, one after the other
 HOLD = 15  # steps
 PICTURE = 'mpc_tank.png'
@@ -168,40 +168,39 @@ class Estimator:
         return self._fitted()
 
     def _fitted(self):
-        """Fit the feeds to the past; a poor fit is compared with those of other modes.
+        """Fit the feeds to the past; compare a poor fit with one that has other modes.
 
-        These are found by simulations with the feeds of before and with guesses.
+        The fit is a local solution in the modes of the one before. The other one starts
+        from the best of simulations with the feeds of before and with guesses.
         """
         before = {name: self.model.component(name).value for name in FEEDS}
-        fits = [self._solve()]
-        if fits[0][0] > POOR:
-            fits += [self._solve(feeds) for feeds in (before, *GUESSES)]
-        misfit, values = min(fits, key=lambda fit: fit[0])
-        if misfit == float('inf'):
+        best = self._solve()
+        if best[0] > POOR:
+            self._simulate(min([before, *GUESSES], key=self._simulate))
+            best = min(best, self._solve(), key=lambda fit: fit[0])
+        if best[0] == float('inf'):
             return FEEDS
-        for v, number in zip(self._variables, values):
+        for v, number in zip(self._variables, best[1]):
             v.set_value(number, skip_validation=True)
         return {name: self.model.component(name).value for name in FEEDS}
 
-    def _solve(self, feeds=None):
-        """Solve from here, or from a simulation; return the misfit and all values."""
-        m, poor = self.model, (float('inf'), [])
-        try:
-            if feeds is not None:
-                self._simulate(feeds)
-            found = self._solver.solve(m, warm_start=True, review=False)
-        except pyomo_fesd.FesdError:  # a tank that runs full or empty
-            return poor
-        values = [v.value for v in self._variables]
-        return (pyo.value(m.misfit), values) if found.solver.status == 'ok' else poor
+    def _solve(self):
+        """Solve from the present values; return the misfit and all values."""
+        found = self._solver.solve(self.model, warm_start=True, review=False)
+        solved = found.solver.status == 'ok'
+        misfit = pyo.value(self.model.misfit) if solved else float('inf')
+        return misfit, [v.value for v in self._variables]
 
     def _simulate(self, feeds):
-        """Simulate the past with some feeds."""
+        """Simulate the past with some feeds; return the misfit."""
         fixed = [self.model.component(name) for name in FEEDS]
         for v, feed in zip(fixed, feeds.values()):
             v.fix(feed)
         try:
             pyomo_fesd.simulate(self.model)
+            return pyo.value(self.model.misfit)
+        except pyomo_fesd.FesdError:  # a tank that runs full or empty
+            return float('inf')
         finally:
             for v in fixed:
                 v.unfix()
