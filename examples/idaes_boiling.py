@@ -12,6 +12,11 @@ one condition. Data and exact times are those of ``flash``. ::
 
     dh/dt = Q,     h = h(T, P, z)
     T_eq = min(max(T, T_bubble), T_dew),     x_i p_i(T_eq) = y_i P
+
+**Why the answer is right.** The times are those of the bubble and the dew point of the
+mixture. Two models that share no equation of equilibrium, the property package with
+exact max and min, and ``units.vle``, find both. The smoothed package has an error that
+is printed beside.
 """
 
 import logging

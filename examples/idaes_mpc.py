@@ -80,14 +80,26 @@ def plant():
     return pyomo_fesd.Plant(m, [m.fs.pid.setpoint])
 
 
-def control(problem):
-    """Build the controller."""
+def control(problem, levels=None):
+    """Build the controller; with ``levels`` it tries held controls too."""
     fs = problem.fs
-    return pyomo_fesd.Controller(problem, [fs.pid.setpoint], [fs.reference])
+    return pyomo_fesd.Controller(
+        problem, [fs.pid.setpoint], [fs.reference], levels=levels
+    )
 
 
-def loop(steps=24, seed=0, time_limit=10, build=control_problem, control=control):
-    """Close the loop; returns plant and the table of steps with the cost of each."""
+def loop(
+    steps=24,
+    seed=0,
+    time_limit=10,
+    build=control_problem,
+    control=control,
+    advanced=False,
+):
+    """Close the loop; return plant and the table of steps with the cost of each.
+
+    With ``advanced`` each plan is prepared before its measurement is there.
+    """
     problem, real, chance, losses = build(), plant(), random.Random(seed), []
     controller = control(problem)
 
@@ -103,7 +115,9 @@ def loop(steps=24, seed=0, time_limit=10, build=control_problem, control=control
                 for flow in feed.flow_vol.values():
                     flow.set_value(share * INFLOW / 2)
 
-    table = pyomo_fesd.receding_horizon(controller, real, steps, before, time_limit)
+    table = pyomo_fesd.receding_horizon(
+        controller, real, steps, before, time_limit, advanced
+    )
     table['cost'] = [*losses, pyo.value(real.model.fs.loss) / INTERVAL]
     return real, table
 

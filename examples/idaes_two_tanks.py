@@ -13,6 +13,11 @@ sodium balance closes. ::
     lye, ester --> Mixer --> reactor ==weir==> second tank ==weir==>
 
     NaOH + EtOAc -> NaOAc + EtOH in both vessels
+
+**Why the answer is right.** Both times are known from the volumes alone, 300 s and 450
+s. The sodium that was fed is in the vessels or in the product: the printed balance
+closes. scipy integrates the same reaction between the two events and ends at the same
+temperature.
 """
 
 from collections import namedtuple

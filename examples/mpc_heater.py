@@ -110,13 +110,23 @@ def price(interval):
     return DEAR if interval // HALF_DAY % 2 else CHEAP
 
 
-def control(problem):
-    """Build the controller."""
-    return pyomo_fesd.Controller(problem, [problem.v], [problem.price])
+def control(problem, levels=5):
+    """Build the controller; with ``levels`` it tries held controls too."""
+    return pyomo_fesd.Controller(problem, [problem.v], [problem.price], levels=levels)
 
 
-def loop(steps=48, seed=0, time_limit=10, build=control_problem, control=control):
-    """Close the loop; returns plant and the table of steps with the cost of each."""
+def loop(
+    steps=48,
+    seed=0,
+    time_limit=10,
+    build=control_problem,
+    control=control,
+    advanced=False,
+):
+    """Close the loop; return plant and the table of steps with the cost of each.
+
+    With ``advanced`` each plan is prepared before its measurement is there.
+    """
     problem, real, chance, losses = build(), plant(), random.Random(seed), []
     controller, interface = control(problem), DynamicModelInterface(problem, problem.t)
     stages = [(k * INTERVAL, (k + 1) * INTERVAL) for k in range(STAGES)]
@@ -130,7 +140,9 @@ def loop(steps=48, seed=0, time_limit=10, build=control_problem, control=control
             real.model.price[t].set_value(prices[0])
         real.model.drawn.set_value(DRAWN * chance.choice((0.3, 0.7, 1.0, 1.3, 1.7)))
 
-    table = pyomo_fesd.receding_horizon(controller, real, steps, before, time_limit)
+    table = pyomo_fesd.receding_horizon(
+        controller, real, steps, before, time_limit, advanced
+    )
     table['cost'] = [*losses, pyo.value(real.model.loss)]
     return real, table
 
@@ -156,7 +168,7 @@ def draw(real, steps):
         rate.plot(some.index, some['v'], '.', color=f'C{number}', label=origin)
     rate.set_ylabel('rate of the band (°C/h)')
     rate.set_xlabel('time (h)')
-    rate.legend()
+    rate.legend(loc='lower right', bbox_to_anchor=(1, 1), ncols=4, frameon=False)
     figure.savefig(PICTURE, dpi=150)
 
 

@@ -35,6 +35,8 @@ U_RANGE, U_REF = (0.02, 0.2), 0.1  # mol/(s atm)
 WEIGHT_P, WEIGHT_U = 0.05, 20.0
 VALVE = 0.93  # of the plant, relative to the model
 PAST = 4  # intervals of the estimator
+POOR = 5.0  # misfit above which another fit is tried
+GUESSES = [FEEDS | {'F_L': share * FEEDS['F_L']} for share in (0.6, 1.0, 1.4)]
 REFERENCES = (30.0, 24.0)  # atm, one after the other
 HOLD = 15  # steps
 PICTURE = 'mpc_tank.png'
@@ -140,6 +142,7 @@ class Estimator:
         m.u.fix()
         self._ends = list(m.t)
         transform(m)
+        self._variables = list(m.component_data_objects(pyo.Var))
         self._interface = pyomo_fesd.MovingModelInterface(m)
         self._solver = pyo.SolverFactory('mpec_hybrid')
         self._solver.set_instance(m, parameters=[m.u, m.seen, m.M_G[0], m.M_L[0]])
@@ -162,10 +165,45 @@ class Estimator:
                 m.seen[k, name] = amount
         for name, amount in self.past[0][0].items():
             m.component(name)[0].set_value(amount)
-        found = self._solver.solve(m, warm_start=True, review=False)
-        if found.solver.status != 'ok':
+        return self._fitted()
+
+    def _fitted(self):
+        """Fit the feeds to the past; compare a poor fit with one that has other modes.
+
+        The fit is a local solution in the modes of the one before. The other one starts
+        from the best of simulations with the feeds of before and with guesses.
+        """
+        before = {name: self.model.component(name).value for name in FEEDS}
+        best = self._solve()
+        if best[0] > POOR:
+            self._simulate(min([before, *GUESSES], key=self._simulate))
+            best = min(best, self._solve(), key=lambda fit: fit[0])
+        if best[0] == float('inf'):
             return FEEDS
-        return {name: m.component(name).value for name in FEEDS}
+        for v, number in zip(self._variables, best[1]):
+            v.set_value(number, skip_validation=True)
+        return {name: self.model.component(name).value for name in FEEDS}
+
+    def _solve(self):
+        """Solve from the present values; return the misfit and all values."""
+        found = self._solver.solve(self.model, warm_start=True, review=False)
+        solved = found.solver.status == 'ok'
+        misfit = pyo.value(self.model.misfit) if solved else float('inf')
+        return misfit, [v.value for v in self._variables]
+
+    def _simulate(self, feeds):
+        """Simulate the past with some feeds; return the misfit."""
+        fixed = [self.model.component(name) for name in FEEDS]
+        for v, feed in zip(fixed, feeds.values()):
+            v.fix(feed)
+        try:
+            pyomo_fesd.simulate(self.model)
+            return pyo.value(self.model.misfit)
+        except pyomo_fesd.FesdError:  # a tank that runs full or empty
+            return float('inf')
+        finally:
+            for v in fixed:
+                v.unfix()
 
 
 class Disturbances:
@@ -184,15 +222,25 @@ class Disturbances:
         return self.feeds
 
 
-def control(problem, rise=None, levels=None):
+def control(problem, rise=None, levels=5):
     """Build the controller; ``rise`` and ``levels`` question the shifted plan."""
     changing = [problem.P_ref, problem.F_L, problem.F_G]
     questions = {'rise': rise, 'levels': levels}
     return pyomo_fesd.Controller(problem, [problem.u], changing, **questions)
 
 
-def loop(steps=60, seed=0, time_limit=None, build=control_problem, control=control):
-    """Close the loop; returns plant and the table of steps with the cost of each."""
+def loop(
+    steps=60,
+    seed=0,
+    time_limit=None,
+    build=control_problem,
+    control=control,
+    advanced=False,
+):
+    """Close the loop; return plant and the table of steps with the cost of each.
+
+    With ``advanced`` each plan is prepared before its measurement is there.
+    """
     problem, real, disturbances, losses = build(), plant(), Disturbances(seed), []
     controller, estimator = control(problem), Estimator()
 
@@ -204,14 +252,16 @@ def loop(steps=60, seed=0, time_limit=None, build=control_problem, control=contr
             losses.append(pyo.value(real.model.loss))
             feeds = estimator(
                 {'M_G': real.model.M_G[0].value, 'M_L': real.model.M_L[0].value},
-                problem.u[INTERVAL].value,
+                real.model.u[INTERVAL].value,
             )
             for name, feed in feeds.items():
                 problem.component(name).set_value(feed)
         for name, feed in disturbances.next().items():
             real.model.component(name).set_value(feed)
 
-    table = pyomo_fesd.receding_horizon(controller, real, steps, before, time_limit)
+    table = pyomo_fesd.receding_horizon(
+        controller, real, steps, before, time_limit, advanced
+    )
     table['cost'] = [*losses, pyo.value(real.model.loss)]
     return real, table
 
@@ -233,7 +283,7 @@ def draw(real, steps):
         valve.plot(some.index, some['u'], '.', color=f'C{number}', label=origin)
     valve.set_ylabel('valve (mol/(s atm))')
     valve.set_xlabel('time (s)')
-    valve.legend()
+    valve.legend(loc='lower right', bbox_to_anchor=(1, 1), ncols=4, frameon=False)
     figure.savefig(PICTURE, dpi=150)
 
 

@@ -4,13 +4,17 @@ Optimal control along a wall: projected dynamics
 
 A point is steered with least effort around an ellipse that it cannot enter. The field
 drives the point onto the ellipse, the ellipse carries it, and the control only has to
-hold it a little to one side. There are two ways around, hence two local minima; the
-initial values choose. Each answer is certified, and independent shooting with ten
-control stages finds the same effort (see the page on complementarity). ::
+hold it a little to one side. There are two ways around; the initial values choose. ::
 
     dx/dt = f(x) + u + grad c(x) lam,   f = (-0.2 (x1 + 1)^2, -0.4 (x2 + 3))
     0 <= lam  perp  c(x) = x1^2/4 + x2^2/16 - 1 >= 0,   |u| <= 1
     from (1, 5) to (0, -4) in 10 time units,   min int 10 |u|^2 dt
+
+**Why the answer is right.** The answer around the right is certified, and independent
+shooting with ten control stages finds the same effort (see the page on
+complementarity). The answer around the left, with 24 times the effort, satisfies all
+equations, but it has no certificate: switches of it coincide, and not every order of
+them could be tested. The program says so.
 """
 
 from math import atan2, cos, pi, sin

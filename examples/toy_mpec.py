@@ -21,6 +21,11 @@ Nearly all paths follow the diagonal first, and rounding decides where they leav
 if they do: counts may differ between machines.
 
 Source: paper, eq. (14) and (15) and Fig. 1; Leyffer and Munson (2007).
+
+**Why the answer is right.** Both solutions can be seen: on each axis the other variable
+is 0, and 1 is the best value. All 21 answers of ``mpec_hybrid`` are one of them to
+1e-11, with a certificate. At the origin the certificate is refused, with the direction
+that descends.
 """
 
 import casadi as ca

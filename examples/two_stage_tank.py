@@ -16,6 +16,10 @@ answer is certified as a local optimum; that it is the global one is not proven.
 
     pip install mpi-sppy mpi4py
     mpiexec -n 2 python examples/two_stage_tank.py
+
+**Why the answer is right.** The extensive form and progressive hedging share no step,
+and their sizes and costs agree (a test asks for 5e-3 m3 and 1e-4). Another test fixes
+the size beside the answer, optimises the rest, and finds higher costs on both sides.
 """
 
 from importlib.util import find_spec

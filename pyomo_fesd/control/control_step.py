@@ -8,6 +8,8 @@ from pyomo_fesd.core import strip_time
 
 #: Where an answer comes from.
 BRANCH, SIMULATED, FULL, DEADLINE, PLAN = ('branch', 'simulated branch', 'full run', 'deadline', 'plan')
+#: Of a plan that was prepared for a predicted state.
+CORRECTED = 'correction'
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,8 @@ class ControlStep:
     origin : str
         'branch': certified, in the branch of the shifted plan or one that descends from it; 'simulated branch': certified, in the
         branch of a simulation; 'full run': of the homotopy; 'deadline': the best feasible point at the deadline; 'plan': no
-        feasible point was found, and the plan of the step before goes on
+        feasible point was found, and the plan of the step before goes on; 'correction': a certified plan for the predicted state,
+        corrected to first order
     certified : bool
     reason : str
         the certificate, or why there is none

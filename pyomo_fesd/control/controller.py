@@ -7,6 +7,8 @@ A step shifts the plan of the step before, loads what was measured, and tries, a
 3. the full run: the homotopy.
 
 With ``levels`` the objective found is compared with those of some simulations (``held_controls``), and a better one is a start.
+After ``prepare``, which solves the plan for the predicted state before the measurement is there, a step first corrects this plan
+to first order (``prepared_plan``), and solves only where the branch would change.
 The first certified solution is the answer; without one the best feasible point; without any the shifted plan itself.
 
 Takes: a model on a moving grid, compiled once.
@@ -25,12 +27,13 @@ from pyomo.core import Block, Objective, Var
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.control.control_step import BRANCH, DEADLINE, FULL, PLAN, SIMULATED, ControlStep
+from pyomo_fesd.control.control_step import BRANCH, CORRECTED, DEADLINE, FULL, PLAN, SIMULATED, ControlStep
 from pyomo_fesd.control.held_controls import HeldControls
 from pyomo_fesd.control.moving_interface import MovingModelInterface
+from pyomo_fesd.control.prepared_plan import PreparedPlan
 from pyomo_fesd.control.states import first_states
 from pyomo_fesd.core import FesdError, interruptible, is_indexed_by
-from pyomo_fesd.mpcc import Deadline
+from pyomo_fesd.mpcc import Deadline, parameter_data
 
 #: Options of the attempts of a step, and where their certified solutions come from unless a homotopy was needed; without a plan
 #: the first attempt is left out.
@@ -93,13 +96,14 @@ class Controller:
         self._held = None if levels is None else HeldControls(model, self._controls, self.interface.time, levels)
         self._variables = list(model.component_data_objects(Var, descend_into=(Block, Disjunct)))
         given = [*first_states(model, self.interface.time), *self.interface.mode_multipliers, *parameters]
+        self._parameters, self._is_moved, self._prepared, self._unprepared = parameter_data(given), False, None, ''
         self._solver.set_instance(model, parameters=given, **options)
 
     @interruptible
     def step(
         self, measured: Any = None, modes: Iterable = (), time_limit: float | None = None, thorough: bool = False
     ) -> ControlStep:
-        """Shift the plan, load the measurement, solve.
+        """Shift the plan, load the measurement, solve; after ``prepare``, correct the plan, which is shifted already.
 
         Parameters
         ----------
@@ -120,21 +124,68 @@ class Controller:
         """
         began, deadline, before = time.perf_counter(), Deadline.after(time_limit), self.values()
         try:
-            search = self._searched(measured, modes, deadline, thorough)
+            self._measure(measured, modes)
+            corrected, refused = (None, '') if thorough else self._corrected(began)
+            search = None if corrected else self._searched(deadline, thorough)
         except BaseException:  # Ctrl-C, too, leaves the plan of before
             self.load(before)
             raise
-        self._has_plan = self._has_plan or search.best is not None
-        self._objective = None if search.best is None else search.best.incumbent_objective
-        return search.answer(began, self.present_controls())
+        self._is_moved, self._prepared, self._unprepared = False, None, ''
+        answer = corrected or search.answer(began, self.present_controls(), refused)
+        self._has_plan, self._objective = self._has_plan or answer.objective is not None, answer.objective
+        return answer
 
-    def _searched(self, measured, modes, deadline, thorough):
-        """The ``_Search`` of one step."""
-        if self._has_plan:
+    def prepare(self, time_limit: float | None = None) -> ControlStep:
+        """Shift the plan and solve it for the state that it predicts, so that the next ``step`` only has to correct it.
+
+        To be called while the present control is applied, before the measurement is there.  The next step changes the prepared
+        plan to first order in everything that differs from the prediction: states and ``parameters``.
+
+        Returns
+        -------
+        ControlStep
+            for the predicted state; not to be applied
+
+        Raises
+        ------
+        FesdError
+            as ``step``
+        """
+        self._prepared, self._unprepared = None, ''
+        answer = self.step(time_limit=time_limit)
+        self._is_moved = True
+        try:
+            if answer.certified:
+                kept = self._parameters, self._controls, self.interface.mode_multipliers
+                self._prepared = PreparedPlan(self._solver.instance, *kept)
+            else:
+                self._unprepared = answer.reason
+        except FesdError as error:
+            self._unprepared = str(error).splitlines()[0]
+        return answer
+
+    def _measure(self, measured, modes):
+        """Move the plan on, unless this is done, and load the measurement."""
+        if self._has_plan and not self._is_moved:
             self.interface.shift_values_by_time()
         if measured is not None:
             self.interface.load_data(measured, time_points=[self.interface.time.first()])
         self.interface.load_modes(modes)
+
+    def _corrected(self, began):
+        """The answer that corrects the prepared plan; or None and why there is none."""
+        if self._prepared is None:
+            return None, self._unprepared
+        try:
+            objective, residual = self._prepared.correct()
+        except FesdError as error:
+            return None, str(error).splitlines()[0]
+        reason = f"to first order from a certified plan for the predicted state, residual {residual:.1e}"
+        seconds = time.perf_counter() - began
+        return ControlStep(self.present_controls(), CORRECTED, False, reason, objective, seconds), ''
+
+    def _searched(self, deadline, thorough):
+        """The ``_Search`` of one step."""
         search = _Search(self, deadline)
         search.run(ATTEMPTS if self._has_plan else ATTEMPTS[1:], thorough)
         if self._held is not None and not deadline.expired():
@@ -230,13 +281,14 @@ class _Search:
         sense = self._controller.sense
         return results.solution_status is not SolutionStatus.optimal, sense * results.incumbent_objective
 
-    def answer(self, began, controls) -> ControlStep:
-        """The best point as a ``ControlStep``."""
+    def answer(self, began, controls, refused) -> ControlStep:
+        """The best point as a ``ControlStep``; ``refused`` says why a prepared plan was not corrected."""
         certified = self.best is not None and self.best.solution_status is SolutionStatus.optimal
         origin = DEADLINE if self.best is not None and not certified and self._deadline.expired() else self._origin
         objective = None if self.best is None else self.best.incumbent_objective
         seconds = time.perf_counter() - began
-        return ControlStep(controls, origin, certified, self._reason(), objective, seconds, self._results)
+        reason = '; '.join(filter(None, (self._reason(), refused and f"not corrected: {refused}")))
+        return ControlStep(controls, origin, certified, reason, objective, seconds, self._results)
 
     def _reason(self):
         if self.best is not None:

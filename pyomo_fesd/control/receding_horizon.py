@@ -16,6 +16,7 @@ def receding_horizon(
     steps: int,
     before: Callable[[int], None] | None = None,
     time_limit: float | None = None,
+    advanced: bool = False,
 ) -> pd.DataFrame:
     """Close the loop: measure, solve, apply the first control stage to the plant, again and again.
 
@@ -29,12 +30,15 @@ def receding_horizon(
         called before each step, to change references, bounds or disturbances in either model
     time_limit : float, optional
         seconds for each step
+    advanced : bool
+        prepare the next plan for the predicted state while a control is applied, and only correct it when the measurement is
+        there (``Controller.prepare``)
 
     Returns
     -------
     pandas.DataFrame
-        a row for each step, by its time: the ``ControlStep`` without its results, and its controls by name;
-        ``plant.trajectory()`` has the states
+        a row for each step, by its time: the ``ControlStep`` without its results, its controls by name, and with ``advanced`` the
+        seconds of the preparation that follows; ``plant.trajectory()`` has the states
 
     Raises
     ------
@@ -47,5 +51,7 @@ def receding_horizon(
             before(number)
         answer = controller.step(plant.measured, plant.modes, time_limit)
         rows[plant.time] = answer.row()
+        if advanced:
+            rows[plant.time]['prepared'] = controller.prepare(time_limit).seconds
         plant.advance(answer.controls)
     return pd.DataFrame.from_dict(rows, orient='index').rename_axis('time')

@@ -80,15 +80,48 @@ class BranchSystem:
             with the reason, where one of them does not exist
         """
         free, fixed = self._free, self._fixed
-        b, d = -(self._M + self._H @ fixed)[free], -(self._D + self._A @ fixed)
-        forward = self._forward(np.asarray(b), d)
-        step = fixed.copy()
-        step[free] = forward.x
-        self._refuse_open(step, self._open[1], self._parameters)
+        b, d = self._right_hand_sides()
+        forward = self._forward(b, d)
+        self._refuse_open(self._with_fixed(forward.x), self._open[1], self._parameters)
         adjoint = self._adjoint(by_w[:, free].T, names)
         through, sizes = by_w[:, free] @ forward.x, np.maximum(1.0, np.abs(by_w[:, free]) @ np.abs(forward.x))
         self._refuse_inexact(through, np.asarray(adjoint.x.T @ b + adjoint.y.T @ d), sizes, names)
         return through + by_w @ fixed
+
+    def by_parameters(self):
+        """Derivatives (n, l) of the variables by the parameters, and the mask (l) of those that exist.
+
+        A variable that the active equations do not determine gets one of its derivatives.
+        """
+        answer = self._kkt.solve(*self._right_hand_sides())
+        return self._with_fixed(answer.x), answer.exists
+
+    def moved(self, step, change):
+        """First-order changes of g, G and H for a ``step`` of the variables and a ``change`` of the parameters."""
+        m, q = len(self._c.lbg), self._c.pairs
+        return np.split((self._at.J @ step + self._at.P @ change)[: m + 2 * q], [m, m + q])
+
+    def refuse_moving(self, step, change):
+        """Refuse a ``step`` of the variables and a ``change`` of the parameters with which open rows do not stay as they are.
+
+        Raises
+        ------
+        FesdError
+            naming the row
+        """
+        names = ["the change of its parameters"]
+        self._refuse_open(step[:, None], (self._open[1] @ change)[:, None], names)
+
+    def _right_hand_sides(self):
+        """Of stationarity and of the active equations, a column for each parameter."""
+        free, fixed = self._free, self._fixed
+        return np.asarray(-(self._M + self._H @ fixed)[free]), -(self._D + self._A @ fixed)
+
+    def _with_fixed(self, x):
+        """Derivatives (n, l) of all variables from those of the free ones."""
+        step = self._fixed.copy()
+        step[self._free] = x
+        return step
 
     def _forward(self, b, d):
         """Derivatives of the variables by the parameters."""

@@ -66,6 +66,11 @@ class MpecHybrid(CasadiSolver):
         super().__init__(**kwds)
         self._persistent = None
 
+    @property
+    def instance(self) -> PersistentModel | None:
+        """The model that ``set_instance`` has compiled."""
+        return self._persistent
+
     @interruptible
     def set_instance(self, model: Block, parameters=(), **kwds) -> None:
         """Compile ``model`` for many solves: ``solve(model)`` then only reads the values that may change.

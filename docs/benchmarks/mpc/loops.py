@@ -1,6 +1,7 @@
 """The loops: three plants, each with predictive control by this package and by peers, with the same disturbances.
 
-``cpu`` and ``ipopt`` of a step are seconds of CPU: of everything, and inside casadi's NLP solvers (their own functions included).
+``cpu`` and ``ipopt`` of a step are seconds of CPU: of everything, and inside casadi's NLP solvers (their own functions included);
+``cpu of preparation`` those of the next plan, solved before its measurement (advanced step).
 """
 
 import importlib
@@ -15,11 +16,13 @@ SEED = 1
 #: Seconds that a step of this package may take, by plant.
 DEADLINES = {'tank': 10.0, 'heater': 15.0, 'idaes': 30.0}
 EXAMPLES = {'tank': 'mpc_tank', 'heater': 'mpc_heater', 'idaes': 'idaes_mpc'}
+ADVANCED = ', advanced step'
 METHODS = (
-    *(('tank', 'pyomo_fesd'), ('tank', 'pyomo_fesd, rise=0.1'), ('tank', 'pyomo_fesd, levels=5')),
-    *(('tank', 'smoothed on a fixed grid'), ('tank', 'nosnoc 0.2.0')),
-    *(('heater', 'pyomo_fesd'), ('heater', 'smoothed on a fixed grid')),
-    *(('idaes', 'pyomo_fesd'), ('idaes', 'smoothed on a fixed grid')),
+    *(('tank', 'pyomo_fesd'), ('tank', 'pyomo_fesd, levels=5'), ('tank', 'pyomo_fesd, levels=5' + ADVANCED)),
+    *(('tank', 'pyomo_fesd, rise=0.1'), ('tank', 'smoothed on a fixed grid'), ('tank', 'nosnoc 0.2.0')),
+    *(('heater', 'pyomo_fesd'), ('heater', 'pyomo_fesd, levels=5'), ('heater', 'pyomo_fesd, levels=5' + ADVANCED)),
+    *(('heater', 'smoothed on a fixed grid'), ('idaes', 'pyomo_fesd'), ('idaes', 'pyomo_fesd' + ADVANCED)),
+    *(('idaes', 'pyomo_fesd, levels=5'), ('idaes', 'smoothed on a fixed grid')),
 )
 
 
@@ -29,10 +32,12 @@ def run_loop(plant, method, steps):
     example, clock = importlib.import_module(EXAMPLES[plant]), NlpClock()
     timed, limit = _Timed(clock), DEADLINES[plant] if method.startswith('pyomo_fesd') else None
     with clock.running(), warnings_off():
-        options = CONTROLS[method](plant, example)
+        options = CONTROLS[method.removesuffix(ADVANCED)](plant, example) | {'advanced': method.endswith(ADVANCED)}
         control = options.pop('control')
         _, table = example.loop(steps, SEED, limit, control=lambda problem: timed.of(control(problem)), **options)
     table['cpu'], table['ipopt'] = timed.cpu, timed.ipopt
+    if timed.preparing:
+        table['cpu of preparation'] = timed.preparing
     return table
 
 
@@ -40,7 +45,7 @@ class _Timed:
     """A controller whose steps are timed."""
 
     def __init__(self, clock):
-        self._clock, self.cpu, self.ipopt = clock, [], []
+        self._clock, self.cpu, self.ipopt, self.preparing = clock, [], [], []
 
     def of(self, controller):
         """Time this one."""
@@ -54,6 +59,13 @@ class _Timed:
         answer = self._controller.step(*given)
         self.cpu.append(time.process_time() - began)
         self.ipopt.append(self._clock.solving)
+        return answer
+
+    def prepare(self, time_limit):
+        """The next plan."""
+        began = time.process_time()
+        answer = self._controller.prepare(time_limit)
+        self.preparing.append(time.process_time() - began)
         return answer
 
 
@@ -70,11 +82,11 @@ def warnings_off():
 
 
 def _own(plant, example):
-    return {'control': example.control}
+    return {'control': partial(example.control, levels=None)}
 
 
 def _with_rise(plant, example):
-    return {'control': partial(example.control, rise=0.1)}
+    return {'control': partial(example.control, rise=0.1, levels=None)}
 
 
 def _with_levels(plant, example):

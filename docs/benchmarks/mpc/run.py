@@ -17,22 +17,23 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import benchmarks  # noqa: F401  puts the examples on the path
 import pandas as pd
 from benchmarks.common.processes import json_lines
-from benchmarks.mpc.loops import METHODS, run_loop
+from benchmarks.mpc.loops import ADVANCED, METHODS, run_loop
 from matplotlib.figure import Figure
 
 HERE = Path(__file__).parent
 #: Seconds for one loop.
-LIMIT = 2400
+LIMIT = 5400
 #: Lines of the other methods.
 COLORS = {'pyomo_fesd, levels=5': 'C8', 'pyomo_fesd, rise=0.1': 'C7', 'smoothed on a fixed grid': '0.7', 'nosnoc 0.2.0': 'k'}
+COLORS |= {'pyomo_fesd' + ADVANCED: 'C6', 'pyomo_fesd, levels=5' + ADVANCED: 'C6'}
 #: Steps that all loops have made.
 COMMON = 25
-ORIGINS = ('branch', 'simulated branch', 'full run', 'deadline', 'plan')
+ORIGINS = ('correction', 'branch', 'simulated branch', 'full run', 'deadline', 'plan')
 
 
 def file_of(plant, method):
     """The file of the steps of one loop."""
-    name = method.split(' on ')[0].replace(', ', '_').replace(' 0.2.0', '').replace('=0.1', '').replace('=5', '')
+    name = method.split(' on ')[0].replace(', ', '_').replace(' 0.2.0', '').replace('=0.1', '').replace('=5', '').replace(' ', '_')
     return HERE / f'steps_{plant}_{name}.csv'
 
 
@@ -48,6 +49,9 @@ def summary(plant, method, table):
         f'cost, first {COMMON}': table['cost'][:COMMON].sum(),
     }
     row[f'median CPU ms, first {COMMON}'] = 1e3 * table['cpu'][:COMMON].median()
+    if 'cpu of preparation' in table:
+        row['median CPU ms, preparation'] = 1e3 * table['cpu of preparation'].median()
+        row['median CPU ms, corrections'] = 1e3 * table['cpu'][table['origin'] == 'correction'].median()
     in_branch = table[(table['origin'] == 'branch') & (table['ipopt'] > 0)]
     for name, part in (('branch', in_branch), ('all', table[table['ipopt'] > 0])):
         row[f'CPU / Ipopt, {name}'] = (part['cpu'] / part['ipopt']).median() if len(part) else None

@@ -50,7 +50,8 @@ def idaes():
     m = idaes_mpc.flowsheet(idaes_mpc.STAGES, lambda m: m)
     m.cost = pyo.Objective(expr=m.fs.loss / idaes_mpc.INTERVAL)
     pid, fs = m.fs.pid, m.fs
-    _collocate(m, fs.time, None, idaes_mpc.ELEMENTS, idaes_mpc.NCP)
+    # applied to the flowsheet, so that pyomo.dae builds its Integral again
+    _collocate(fs, fs.time, None, idaes_mpc.ELEMENTS, idaes_mpc.NCP)
     idaes_level.specify(m)
     pid.setpoint.unfix()
     pid.setpoint.setlb(0.3)

@@ -12,12 +12,17 @@ import highspy
 import numpy as np
 
 #: HiGHS' own 1e-7 is too coarse.  With such tolerances its presolve calls some LPECs infeasible although d = 0 is feasible, and
-#: d = 0 optimal in others that have descent, so it stays off.
+#: d = 0 optimal in others that have descent, so it stays off.  The dual simplex method may cycle at such tolerances, at the optimum
+#: already, where the primal one ends.
+PRIMAL_SIMPLEX = {'presolve': 'off', 'tolerance': 1e-9, 'simplex_strategy': 4}
 ATTEMPTS = (
     {'presolve': 'off', 'tolerance': 1e-9},
+    PRIMAL_SIMPLEX,
     {'presolve': 'off', 'tolerance': 1e-8, 'solver': 'ipm'},
     {'presolve': 'off', 'tolerance': 1e-7},
 )
+#: Iterations of the simplex method without binaries before the next attempt, for each row and column; the last has no limit.
+ITERATIONS = 3
 TOLERANCES = ('primal_feasibility_tolerance', 'dual_feasibility_tolerance', 'mip_feasibility_tolerance')
 #: The equilibrated cost has entries up to 1; the defaults (1e-6 and 1e-4) would call d = 0 optimal beside a small descent.
 GAPS = {'mip_abs_gap': 1e-9, 'mip_rel_gap': 1e-6}
@@ -88,7 +93,7 @@ def solve(program, options, deadline, start=None, clear=False, limits=None):
     """
     p, rows, factor = program.equilibrated()
     limits = limits or {}
-    for attempt in ATTEMPTS:
+    for attempt in _attempts(p):
         highs = highspy.Highs()
         for name, option in _settings(attempt, p.binaries, clear, deadline, limits | options).items():
             highs.setOptionValue(name, option)
@@ -151,6 +156,14 @@ def _holds(p, d):
 def _bounded(highs, value):
     """Whether HiGHS has proved that nothing is much better than ``value``."""
     return highs.getInfo().mip_dual_bound >= value - GAP * max(1.0, abs(value))
+
+
+def _attempts(p):
+    """Tolerances and HiGHS options of each attempt."""
+    if p.binaries:
+        return [attempt for attempt in ATTEMPTS if attempt is not PRIMAL_SIMPLEX]
+    limit = {'simplex_iteration_limit': ITERATIONS * sum(p.A.shape)}
+    return [limit | attempt for attempt in ATTEMPTS[:-1]] + list(ATTEMPTS[-1:])
 
 
 def _settings(attempt, binaries, clear, deadline, given):

@@ -1,0 +1,31 @@
+"""Linear programs in HiGHS: the answer, and the attempts where a method does not end."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from pyomo_fesd.mpcc.nlp import Deadline
+from pyomo_fesd.mpcc.subproblems import linear_program
+from pyomo_fesd.mpcc.subproblems.linear_program import Program, solve
+
+
+def assignment(binaries=0):
+    """min -sum c x over doubly stochastic matrices of order 3 in [0, 1]."""
+    cost = -np.array([3.0, 1, 2, 2, 4, 1, 1, 2, 5])
+    rows = sparse.csr_matrix(np.vstack([np.kron(np.eye(3), np.ones(3)), np.kron(np.ones(3), np.eye(3))]))
+    return Program(cost, rows, np.ones(6), np.ones(6), np.zeros(9), np.ones(9), np.ones(9), binaries)
+
+
+@pytest.mark.parametrize('binaries', [0, 9])
+@pytest.mark.parametrize('iterations', [3, 0])
+def test_a_simplex_method_that_does_not_end_costs_no_answer(monkeypatch, binaries, iterations):
+    monkeypatch.setattr(linear_program, 'ITERATIONS', iterations)
+    answer = solve(assignment(binaries), {}, Deadline())
+    assert answer.d == pytest.approx(np.eye(3).ravel(), abs=1e-6) and not answer.cut_short
+
+
+def test_only_attempts_before_the_last_have_a_limit_and_binaries_skip_the_primal_method():
+    relaxed, mixed = linear_program._attempts(assignment()), linear_program._attempts(assignment(9))
+    limits = [attempt.get('simplex_iteration_limit') for attempt in relaxed]
+    assert limits[-1] is None and set(limits[:-1]) == {linear_program.ITERATIONS * 15}
+    assert len(mixed) == len(relaxed) - 1 and not any('simplex_iteration_limit' in attempt for attempt in mixed)
