@@ -16,7 +16,7 @@ def unit_of(expr):
     if not _mentions_units(expr):
         return None
     try:
-        return units.get_units(expr)
+        return _unless_dimensionless(units.get_units(expr))
     except (UnitsError, TypeError):
         return None
 
@@ -39,7 +39,11 @@ def time_unit(x, xdot):
     if own == [None, None]:
         return None
     above, below = (1 if unit is None else unit for unit in own)
-    return units.get_units(above / below)
+    return _unless_dimensionless(units.get_units(above / below))
+
+
+def _unless_dimensionless(unit):
+    return None if str(unit) == 'dimensionless' else unit
 
 
 def _mentions_units(expr):
