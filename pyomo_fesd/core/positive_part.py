@@ -2,8 +2,9 @@
 
     s = max(0, z/[z]):    0 <= s  perp  s - z/[z] >= 0
 
-One variable and one pair, no equation; [z] is the unit of z, 1 in most models.  max(a, b) = b + max(0, a - b), |z| = 2 max(0, z) - z; a piecewise linear function has
-one s for each breakpoint.  Both sides are continuous in time where z is, so a change of side falls on an element boundary.
+One variable and one pair, no equation; [z] is the unit of z, 1 in most models.  max(a, b) = b + max(0, a - b),
+|z| = 2 max(0, z) - z; a piecewise linear function has one s for each breakpoint.  Both sides are continuous in time where z is, so
+a change of side falls on an element boundary.
 
 Takes: a block of its own, and z as an expression.
 Leaves: ``s`` and ``complementarity`` on that block.

@@ -1,4 +1,4 @@
-"""Units of measure in generated equations: generated variables have none, expressions of the model enter as multiples of their unit.
+"""Units of measure in generated equations: generated variables have none, expressions enter as multiples of their unit.
 
     c/[c] = p - n,    max(0, z) = s [z]
 

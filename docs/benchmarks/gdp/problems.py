@@ -13,7 +13,10 @@ def jobs(durations):
     """Zero-wait scheduling (Raman and Grossmann 1994): jobs pass the stages in order, none waits, the last one ends early."""
     m = pyo.ConcreteModel()
     horizon = sum(map(sum, durations))
-    m.start, m.end = pyo.Var(range(len(durations)), bounds=(0, horizon), initialize=0), pyo.Var(bounds=(0, horizon), initialize=horizon)
+    m.start, m.end = (
+        pyo.Var(range(len(durations)), bounds=(0, horizon), initialize=0),
+        pyo.Var(bounds=(0, horizon), initialize=horizon),
+    )
     m.last = pyo.Constraint(m.start.index_set(), rule=lambda m, i: m.end >= m.start[i] + sum(durations[i]))
     clashes = [
         (i, k, j)
@@ -78,7 +81,9 @@ def discounts(exact=False):
         return price * m.bought[k], (price - later) * limit + later * m.bought[k]
 
     if exact:
-        m.offer = pyo.Block(offers, rule=lambda b, k: setattr(b, 'row', pyo.Constraint(expr=m.paid[k] == pyomo_fesd.minimum(b, *terms(m, k)))))
+        m.offer = pyo.Block(
+            offers, rule=lambda b, k: setattr(b, 'row', pyo.Constraint(expr=m.paid[k] == pyomo_fesd.minimum(b, *terms(m, k))))
+        )
     else:
         m.offer = Disjunction(offers, rule=lambda m, k: [[m.paid[k] == term] for term in terms(m, k)])
     return m
@@ -101,10 +106,17 @@ def three_discs():
 def two_reactors():
     """The conversion and the size of one of two reactors (Lee and Grossmann 2001)."""
     m = pyo.ConcreteModel()
-    m.flow, m.conversion, m.price = pyo.Var(bounds=(0, 8), initialize=4), pyo.Var(bounds=(0, 1), initialize=0.5), pyo.Var(bounds=(1.5, 2.5), initialize=2)
+    m.flow, m.conversion, m.price = (
+        pyo.Var(bounds=(0, 8), initialize=4),
+        pyo.Var(bounds=(0, 1), initialize=0.5),
+        pyo.Var(bounds=(1.5, 2.5), initialize=2),
+    )
     curves = ((-8, 9, 0.2, 0.95, 2.5), (-10, 15, 0.7, 0.99, 1.5))
     m.reactor = Disjunction(
-        expr=[[m.flow == a * m.conversion + b, m.conversion >= low, m.conversion <= high, m.price == c] for a, b, low, high, c in curves]
+        expr=[
+            [m.flow == a * m.conversion + b, m.conversion >= low, m.conversion <= high, m.price == c]
+            for a, b, low, high, c in curves
+        ]
     )
     m.demand = pyo.Constraint(expr=m.flow * m.conversion <= 2)
     m.goal = pyo.Objective(expr=-(2 * m.flow * m.conversion - 0.2 * m.flow - m.price))
@@ -141,7 +153,8 @@ def heat_exchangers():
     m.size = Disjunction(
         [1, 2, 3],
         rule=lambda m, k: [
-            [m.cost[k] == factor * m.area[k] ** 0.6 + fixed, m.area[k] >= low, m.area[k] <= high] for factor, fixed, low, high in sizes
+            [m.cost[k] == factor * m.area[k] ** 0.6 + fixed, m.area[k] >= low, m.area[k] <= high]
+            for factor, fixed, low, high in sizes
         ],
     )
     m.recovered = pyo.Constraint(expr=10 * (500 - m.hot) == 1.5 * m.area[1] * ((500 - m.cold) + (m.hot - 350)) / 2)
@@ -167,9 +180,7 @@ def eight_processes():
     def closed(*streams):
         return [f[k] == 0 for k in streams]
 
-    m.first = Disjunction(
-        expr=[unit(1, exp(f[3]) - 1 == f[2], *closed(4, 5)), unit(2, exp(f[5] / 1.2) - 1 == f[4], *closed(2, 3))]
-    )
+    m.first = Disjunction(expr=[unit(1, exp(f[3]) - 1 == f[2], *closed(4, 5)), unit(2, exp(f[5] / 1.2) - 1 == f[4], *closed(2, 3))])
     m.third = Disjunction(expr=[unit(3, 1.5 * f[9] + f[10] == f[8]), [*closed(9), f[10] == f[8]]])
     m.fourth = Disjunction(
         expr=[
@@ -194,7 +205,13 @@ def eight_processes():
     m.ratios = pyo.ConstraintList()
     for row in (f[10] <= 0.8 * f[17], f[10] >= 0.4 * f[17], f[12] <= 5 * f[14], f[12] >= 2 * f[14]):
         m.ratios.add(row)
-    uses = {'6': m.sixth.disjuncts[0], '7': m.sixth.disjuncts[1], '4': m.fourth.disjuncts[0], '3': m.third.disjuncts[0], '8': m.eighth.disjuncts[0]}
+    uses = {
+        '6': m.sixth.disjuncts[0],
+        '7': m.sixth.disjuncts[1],
+        '4': m.fourth.disjuncts[0],
+        '3': m.third.disjuncts[0],
+        '8': m.eighth.disjuncts[0],
+    }
     y = {name: d.indicator_var for name, d in uses.items()}
     m.logic = pyo.LogicalConstraintList()
     m.logic.add(y['4'].equivalent_to(y['6'].lor(y['7'])))
@@ -230,7 +247,9 @@ def layout(sizes, circles, prices):
     def corners(m, i, c):
         cx, cy, r = circles[c]
         return [
-            (m.x[i] + a * sizes[i][0] / 2 - cx) ** 2 + (m.y[i] + b * sizes[i][1] / 2 - cy) ** 2 <= r**2 for a in (-1, 1) for b in (-1, 1)
+            (m.x[i] + a * sizes[i][0] / 2 - cx) ** 2 + (m.y[i] + b * sizes[i][1] / 2 - cy) ** 2 <= r**2
+            for a in (-1, 1)
+            for b in (-1, 1)
         ]
 
     m.apart = Disjunction(near, rule=apart)
@@ -243,23 +262,34 @@ def three_in_circles():
     return layout([(5, 6), (7, 5), (3, 3)], [(15, 10, 6), (50, 80, 5)], {(0, 1): 300, (0, 2): 240, (1, 2): 100})
 
 
-#: Problems by name: how to build each, and 'linear', 'convex' or 'nonconvex'.
+def four_plants():
+    """Four times the heat exchangers, independent of one another: 531,441 choices, and the best of each is known."""
+    m = pyo.ConcreteModel()
+    m.plant = pyo.Block([1, 2, 3, 4], rule=lambda b, k: b.transfer_attributes_from(heat_exchangers()))
+    for b in m.plant.values():
+        b.goal.deactivate()
+    m.goal = pyo.Objective(expr=sum(b.goal.expr for b in m.plant.values()))
+    return m
+
+
+#: Problems by name: how to build each; 'linear', 'convex' or 'nonconvex'; how to build it with Disjunctions, if it has none.
 PROBLEMS = {
-    'three jobs': (three_jobs, 'linear'),
-    'six jobs': (six_jobs, 'linear'),
-    'four rectangles': (four_rectangles, 'linear'),
-    'discounts': (discounts, 'linear'),
-    'discounts by minimum': (discounts_by_minimum, 'linear'),
-    'two segments (Pyomo)': (models.twoSegments_SawayaGrossmann, 'linear'),
-    'network (Pyomo)': (models.makeExpandedNetworkDisjunction, 'linear'),
-    'nested (Pyomo)': (models.makeBetweenStepsPaperExample_Nested, 'convex'),
-    'logic (Pyomo)': (models.makeLogicalConstraintsOnDisjuncts, 'linear'),
-    'three discs': (three_discs, 'convex'),
-    'four circles (Pyomo)': (models.fourCircles, 'convex'),
-    'Grossmann, two Disjunctions (Pyomo)': (models.grossmann_twoDisj, 'linear'),
-    'eight processes': (eight_processes, 'convex'),
-    'three in circles': (three_in_circles, 'convex'),
-    'two reactors': (two_reactors, 'nonconvex'),
-    'two choices': (two_choices, 'nonconvex'),
-    'heat exchangers': (heat_exchangers, 'nonconvex'),
+    'three jobs': (three_jobs, 'linear', None),
+    'six jobs': (six_jobs, 'linear', None),
+    'four rectangles': (four_rectangles, 'linear', None),
+    'discounts': (discounts, 'linear', None),
+    'discounts by minimum': (discounts_by_minimum, 'linear', discounts),
+    'two segments (Pyomo)': (models.twoSegments_SawayaGrossmann, 'linear', None),
+    'network (Pyomo)': (models.makeExpandedNetworkDisjunction, 'linear', None),
+    'two boxes (Pyomo)': (models.grossmann_twoDisj, 'linear', None),
+    'logic (Pyomo)': (models.makeLogicalConstraintsOnDisjuncts, 'linear', None),
+    'nested (Pyomo)': (models.makeBetweenStepsPaperExample_Nested, 'convex', None),
+    'four circles (Pyomo)': (models.fourCircles, 'convex', None),
+    'three discs': (three_discs, 'convex', None),
+    'eight processes': (eight_processes, 'convex', None),
+    'three in circles': (three_in_circles, 'convex', None),
+    'two reactors': (two_reactors, 'nonconvex', None),
+    'two choices': (two_choices, 'nonconvex', None),
+    'heat exchangers': (heat_exchangers, 'nonconvex', None),
+    'four plants': (four_plants, 'nonconvex', None),
 }

@@ -1,10 +1,10 @@
-"""Problems with Disjunctions and without time: as an MPCC by ``mpec_hybrid``, beside Pyomo's gdp.bigm and gdp.hull with HiGHS and GDPopt.
+"""Disjunctions without time: as an MPCC by ``mpec_hybrid``, beside Pyomo's gdp.bigm and gdp.hull with HiGHS, and GDPopt.
 
     python docs/benchmarks/gdp/run.py [--fresh] [--only 'eight processes']
 
-Each problem runs in a process of its own with a time limit.  Writes rows.csv and summary.csv beside this file; problems that have rows
-are skipped.  The reference is gdp.bigm with HiGHS where all is linear, else the enumeration of all choices (gdpopt.enumerate), each a
-local NLP.
+Each problem runs in a process of its own with a time limit.  Writes rows.csv and summary.csv beside this file; problems that have
+rows are skipped.  The reference is the best objective that any method found: with HiGHS the global optimum where all is linear, and
+with the enumeration of all choices (gdpopt.enumerate) where each choice is convex.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from pyomo.gdp import Disjunct, Disjunction
 import pyomo_fesd
 
 PLACES = (pyo.Block, Disjunct)
-HERE, LIMIT, CLOSE = Path(__file__).parent, 400, 1e-4
+HERE, LIMIT, CLOSE, NONE = Path(__file__).parent, 400, 1e-4, 'no answer'
 COLUMNS = ('problem', 'class', 'method', 'objective', 'reference', 'violation', 'pairs', 'status', 'verdict', 'seconds')
 
 
@@ -125,32 +125,32 @@ def _violations(block, logic):
 
 def run(name):
     """Print one row for each method."""
-    build, kind = PROBLEMS[name]
-    reference = None
+    build, kind, unlike = PROBLEMS[name]
     by_pairs()(three_jobs())  # imports are not timed
     for method, (solve, kinds) in METHODS.items():
         if kind not in kinds:
             continue
-        m, row = build(), {'problem': name, 'class': kind, 'method': method}
-        maximised, started = not _objective(m).is_minimizing(), process_time()
+        m, row = (build if method.startswith('pairs') else unlike or build)(), {'problem': name, 'class': kind, 'method': method}
+        row['sign'], started = 1 if _objective(m).is_minimizing() else -1, process_time()
         try:
             row['objective'], row['violation'], row['pairs'], row['status'] = solve(m)
         except Exception as error:  # whatever a solver says of a problem is a row
             row['status'] = f'{type(error).__name__}: {str(error).strip().splitlines()[0][:100]}'
         row['seconds'] = round(process_time() - started, 2)
-        reference = row.get('objective') if reference is None else reference
-        row['reference'] = reference
-        row['verdict'] = _verdict(row.get('objective'), reference, row.get('violation') or 0.0, maximised)
         print(json.dumps(row), flush=True)
 
 
-def _verdict(objective, reference, violated, maximised):
-    if objective is None:
-        return 'no answer'
-    if violated > CLOSE:
-        return 'violated'
-    worse = (reference - objective if maximised else objective - reference) / max(1.0, abs(reference))
-    return 'best' if abs(worse) <= CLOSE else 'worse' if worse > 0 else 'better than the reference'
+def judged(found):
+    """The rows of one problem with the reference, the best objective that any method found, and a verdict."""
+    answers = [row for row in found if row.get('objective') is not None and (row['violation'] or 0.0) <= CLOSE]
+    best = min((row['sign'] * row['objective'] for row in answers), default=None)
+    for row in found:
+        sign = row.pop('sign')
+        row['reference'] = None if best is None else sign * best
+        row['verdict'] = NONE if row.get('objective') is None else 'violated' if row not in answers else None
+        if row['verdict'] is None:
+            row['verdict'] = 'best' if sign * row['objective'] - best <= CLOSE * max(1.0, abs(best)) else 'worse'
+        yield row
 
 
 def summary(table):
@@ -175,12 +175,12 @@ def main():
         missing = [m for m, (_, kinds) in METHODS.items() if PROBLEMS[name][1] in kinds and (name, m) not in rows]
         if missing:
             found, status = json_lines(__file__, '--run', name, limit=LIMIT)
-            for row in found:
+            for row in judged(found):
                 rows.add(row)
             done = {row['method'] for row in found}
             for method in missing if status != 'ok' else ():
                 if method not in done:
-                    rows.add({'problem': name, 'class': PROBLEMS[name][1], 'method': method, 'status': status, 'verdict': 'no answer'})
+                    rows.add({'problem': name, 'class': PROBLEMS[name][1], 'method': method, 'status': status, 'verdict': NONE})
             print(name, [(row['method'], row['verdict']) for row in found], status, flush=True)
     summary(pd.read_csv(rows.path)).to_csv(HERE / 'summary.csv', index=False, lineterminator='\n')
 

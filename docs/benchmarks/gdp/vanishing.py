@@ -4,8 +4,8 @@ For a Disjunction with disjuncts i, each constraint g <= 0 of a disjunct gets a 
 
     sum_i nu_i = 1,    nu_i >= 0,    g_i(x) <= s_i,    0 <= nu_i  perp  s_i >= 0
 
-Equations get two slacks.  Disjuncts in a disjunct share its nu.  Where indicators occur elsewhere (logic, an objective), and for other
-binary variables, 0 <= nu perp 1 - nu >= 0.
+Equations get two slacks.  Disjuncts in a disjunct share its nu.  Where indicators occur elsewhere (logic, an objective), and for
+other binary variables, 0 <= nu perp 1 - nu >= 0.
 """
 
 import pyomo.environ as pyo

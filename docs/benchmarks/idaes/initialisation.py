@@ -2,9 +2,9 @@
 
     python docs/benchmarks/idaes/initialisation.py [--fresh] [--only CSTR]
 
-Runs the tests whose names contain one of ``WORDS``, file by file, within ``pyomo_fesd.casadi_ipopt.stand_in``, and writes the outcome
-of each to initialisation.csv, and their counts by model to models.csv.  Tests of models that need IDAES' compiled functions are
-skipped by IDAES itself, or fail and are listed.  Seconds are CPU seconds.  Needs the extra [idaes].
+Runs the tests whose names contain one of ``WORDS``, file by file, within ``pyomo_fesd.casadi_ipopt.stand_in``, and writes the
+outcome of each to initialisation.csv, and their counts by model to models.csv.  Tests of models that need IDAES' compiled functions
+are skipped by IDAES itself, or fail and are listed.  Seconds are CPU seconds.  Needs the extra [idaes].
 """
 
 import argparse
