@@ -37,8 +37,8 @@ def branch_equations(model: Block) -> BlockData:
     copy.add_component(NAME, ConstraintList())
     for pair in pairs:
         copy.component(NAME).add(_smaller(pair) == 0)
-    for pair in copy.component_data_objects(Complementarity, active=True, descend_into=Block):
-        pair.deactivate()
+    for condition in list(copy.component_objects(Complementarity, descend_into=Block)):
+        condition.deactivate()  # with its container: assert_units_consistent refuses an active one
     grids = moving_grids(copy)
     for moving in grids.values():
         for v in moving.block.component_data_objects(Var, descend_into=Block):

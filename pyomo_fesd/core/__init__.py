@@ -6,8 +6,8 @@ written by ``fesd.finite_elements``; ``held_controls`` reads from it) and ``homo
 ``private_data`` keeps them on blocks, ``generated`` recognises generated blocks, ``keywords`` refuses values outside of their
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
-``evaluation``, ``gradient``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``expression_key`` and ``phase`` are
-tools. This room imports from no other.
+``evaluation``, ``gradient``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``units_of_measure``, ``expression_key``
+and ``phase`` are tools. This room imports from no other.
 """
 
 from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
@@ -97,5 +97,6 @@ from pyomo_fesd.core.time_index import (
     strip_time,
 )
 from pyomo_fesd.core.turns import REDIRECTION, TRANSFORMATION
+from pyomo_fesd.core.units_of_measure import in_unit_of, time_unit, unit_of, without_unit
 from pyomo_fesd.core.version import __version__
 from pyomo_fesd.core.withheld_messages import withheld_messages

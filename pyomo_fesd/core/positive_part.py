@@ -1,9 +1,10 @@
 """The positive part of an expression, from which all continuous piecewise functions are made (theory, eq. 8).
 
-    s = max(0, z):    0 <= s  perp  s - z >= 0
+    s = max(0, z/[z]):    0 <= s  perp  s - z/[z] >= 0
 
-One variable and one pair, no equation.  max(a, b) = b + max(0, a - b), |z| = 2 max(0, z) - z; a piecewise linear function has
-one s for each breakpoint.  Both sides are continuous in time where z is, so a change of side falls on an element boundary.
+One variable and one pair, no equation; [z] is the unit of z, 1 in most models.  max(a, b) = b + max(0, a - b),
+|z| = 2 max(0, z) - z; a piecewise linear function has one s for each breakpoint.  Both sides are continuous in time where z is, so
+a change of side falls on an element boundary.
 
 Takes: a block of its own, and z as an expression.
 Leaves: ``s`` and ``complementarity`` on that block.
@@ -17,6 +18,7 @@ from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core.evaluation import value_or_zero
 from pyomo_fesd.core.switched_systems import switched_systems
+from pyomo_fesd.core.units_of_measure import without_unit
 
 
 def declare_positive_part(block: BlockData, *index) -> None:
@@ -28,8 +30,8 @@ def declare_positive_part(block: BlockData, *index) -> None:
 
 
 def add_positive_part(block: BlockData, index: tuple, z) -> VarData:
-    """Add max(0, z) at ``index`` (empty for a scalar) and return the variable s."""
+    """Add max(0, z/[z]) at ``index`` (empty for a scalar) and return the variable s."""
     s = block.s[index or None]
     s.set_value(max(0.0, value_or_zero(z)), skip_validation=True)
-    block.complementarity.add(index or None, complements(s >= 0, s - z >= 0))
+    block.complementarity.add(index or None, complements(s >= 0, s - without_unit(z) >= 0))
     return s

@@ -17,6 +17,7 @@ from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core.evaluation import value_or_zero
 from pyomo_fesd.core.switched_systems import Dependents, switched_systems
+from pyomo_fesd.core.units_of_measure import without_unit
 
 #: Distances below this are 0.
 ZERO = 1e-8
@@ -43,7 +44,7 @@ def add_smallest(block: BlockData, index: tuple, g: list) -> list:
     mu.value, *found = smallest_values([value_or_zero(g_i) for g_i in g])
     for i, g_i in enumerate(g):
         nu[i].value, lam[i].value = 1 / len(g), found[i]
-        block.stationarity.add((*index, i + 1) if index else i + 1, g_i - lam[i] - mu == 0)
+        block.stationarity.add((*index, i + 1) if index else i + 1, without_unit(g_i) - lam[i] - mu == 0)
         block.complementarity.add((*index, i + 1) if index else i + 1, complements(nu[i] >= 0, lam[i] >= 0))
         if i:
             # all but one: the last follows from the simplex

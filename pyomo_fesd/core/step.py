@@ -1,8 +1,9 @@
 """The step function of an expression c: the Heaviside form, functions that jump and friction are made of it (theory, eq. 5).
 
-    c = p - n,    0 <= alpha  perp  n >= 0,    0 <= 1 - alpha  perp  p >= 0
+    c/[c] = p - n,    0 <= alpha  perp  n >= 0,    0 <= 1 - alpha  perp  p >= 0
 
-so alpha is 1 where c > 0 and 0 where c < 0; p = max(0, c) and n = max(0, -c) are continuous in time where c is.
+so alpha is 1 where c > 0 and 0 where c < 0; p = max(0, c) and n = max(0, -c) are continuous in time where c is.  [c] is the unit
+of c, 1 in most models.
 
 Takes: a block of its own, and c as an expression.
 Leaves: ``alpha``, ``p``, ``n``, ``switching`` (c = p - n) and ``complementarity`` (its last index: 1 and 2) on that block.
@@ -18,6 +19,7 @@ from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core.evaluation import value_or_zero
 from pyomo_fesd.core.switched_systems import Dependents, Step, switched_systems
+from pyomo_fesd.core.units_of_measure import without_unit
 
 #: Values below this are 0.
 ZERO = 1e-8
@@ -48,7 +50,7 @@ def add_step(block: BlockData, index: tuple, c, lean: float = 0.0) -> VarData:
     now = float(value_or_zero(c))  # start values may be numpy numbers, whose comparisons cannot be subtracted
     p.value, n.value, _ = step_values([now])
     alpha.value = 0.5 + lean * ((now > 0) - (now < 0))
-    block.switching.add(index or None, c == p - n)
+    block.switching.add(index or None, without_unit(c) == p - n)
     block.complementarity.add((*index, 1), complements(alpha >= 0, n >= 0))
     block.complementarity.add((*index, 2), complements(1 - alpha >= 0, p >= 0))
     switched_systems(block).steps.append(Step(alpha, c))

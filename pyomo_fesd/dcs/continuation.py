@@ -21,7 +21,7 @@ from pyomo.core import Block, Constraint, Set, Var
 from pyomo.core.expr import cos, cosh, exp, sin, tanh
 from pyomo.core.expr.numeric_expr import DivisionExpression
 
-from pyomo_fesd.core import add_positive_part, declare_positive_part, exchanged, value_or_nan
+from pyomo_fesd.core import add_positive_part, declare_positive_part, exchanged, value_or_nan, without_unit
 from pyomo_fesd.dcs.forms import hysteresis
 from pyomo_fesd.dcs.reading import arguments_of, factors_of
 
@@ -102,7 +102,7 @@ class Continuation:
         known = self._form.shortfall(self._block, self._index, self._system, mode, k)
         if known is not None:
             return known
-        c, sign = self._system.regions.functions[k], self._system.regions.geometry.signs[mode][k]
+        c, sign = without_unit(self._system.regions.functions[k]), self._system.regions.geometry.signs[mode][k]
         if self._block.component('shortfall') is None:
             self._block.shortfall = Block()
             self._block.shortfall.functions = Set(dimen=1)

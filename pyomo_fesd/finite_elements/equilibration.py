@@ -17,7 +17,7 @@ from math import prod
 from pyomo.core import Block, Constraint, Expression, quicksum
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import BranchConstraint, MovingGrid, Penalty, homotopy_hints
+from pyomo_fesd.core import BranchConstraint, MovingGrid, Penalty, homotopy_hints, without_unit
 from pyomo_fesd.finite_elements.contacts import impulse_activity
 from pyomo_fesd.finite_elements.state_jumps import no_jump
 
@@ -59,7 +59,7 @@ def add_equilibration(moving: MovingGrid, mode: str, rho: float) -> None:
     for condition in independent:
         for element in moving.grid.elements:
             if condition.points(element):
-                G, H = (quicksum(condition.values(element, side)) for side in (0, 1))
+                G, H = (without_unit(quicksum(condition.values(element, side))) for side in (0, 1))
                 block.activity[condition.name, element.n] = G / (G + H + TINY)
     block.eta = moving.eta = Expression(block.element)
     block.equal_length = Constraint(block.element)

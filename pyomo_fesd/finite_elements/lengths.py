@@ -25,6 +25,7 @@ from pyomo_fesd.core import (
     homotopy_hints,
     is_discretisation_equation,
     public_name,
+    time_unit,
 )
 
 #: The least r_n of a solution: the shortest that tolerances distinguish from zero.
@@ -105,13 +106,15 @@ def _determining(model) -> Iterator[tuple]:
 
 
 def multiply_derivatives(moving: MovingGrid) -> None:
-    """Multiply the derivative in every discretisation equation by (r_n sigma)**k."""
+    """Multiply the derivative in every discretisation equation by (r_n sigma)**k, and by the unit that pyomo.dae leaves out."""
     owner, times = moving.grid.element_of(), TimeIndex(moving.wrt)
     for derivative, order, equations in discretisation_equations(moving.block.model(), moving.wrt):
+        units = [time_unit(derivative.get_state_var()[index], derivative[index]) for index in list(equations)[:1]]
         for index, equation in equations.items():
             rate = moving.speed(owner[times.time(equation)])
             xdot = derivative[index]
             scaled = rate * xdot if order == 1 else rate**order * xdot
+            scaled = scaled if units == [None] else scaled * units[0]
             left, right = equation.expr.args
             if left is xdot:
                 equation.set_value(scaled == right)

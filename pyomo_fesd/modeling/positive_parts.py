@@ -3,7 +3,6 @@
 from pyomo.common.autoslots import AutoSlots
 from pyomo.core import Block
 from pyomo.core.base.block import BlockData
-from pyomo.core.base.var import VarData
 from pyomo.core.expr.visitor import identify_variables
 
 from pyomo_fesd.core import (
@@ -13,6 +12,7 @@ from pyomo_fesd.core import (
     continuous_sets,
     declare_positive_part,
     discretised,
+    in_unit_of,
     refuse_foreign,
 )
 
@@ -70,12 +70,12 @@ def next_number(block: BlockData) -> int:
     return count.requested
 
 
-def add_to_block(block: BlockData, number: int, z) -> VarData:
-    """Add s = max(0, z) to a user's block, in a generated block of its own, and return s."""
+def add_to_block(block: BlockData, number: int, z):
+    """Add s = max(0, z/[z]) to a user's block, in a generated block of its own, and return s [z], max(0, z) in its unit."""
     name = GENERATED + 'functions'
     if block.component(name) is None:
         block.add_component(name, Block())
     generated = Block()
     block.component(name).add_component(f'kink_{number}', generated)
     declare_positive_part(generated)
-    return add_positive_part(generated, (), z)
+    return in_unit_of(add_positive_part(generated, (), z), z)

@@ -3,9 +3,8 @@
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Set
-from pyomo.core.base.var import VarData
 
-from pyomo_fesd.core import GENERATED, add_positive_part, declare_positive_part, index_tuple
+from pyomo_fesd.core import GENERATED, add_positive_part, declare_positive_part, in_unit_of, index_tuple
 
 NAME = GENERATED + 'kinks'
 
@@ -32,13 +31,13 @@ def _pair_sources(block):
     return block.private_data('pyomo_fesd.smoothing').by_pair
 
 
-def add_to_source(source, number: int, z) -> VarData:
-    """Add s = max(0, z) as positive part ``number`` of a source (a ConstraintData, ...) and return s."""
+def add_to_source(source, number: int, z):
+    """Add s = max(0, z/[z]) as positive part ``number`` of a source (a ConstraintData, ...) and return s [z], in the unit of z."""
     block = _find(source) or _declare_positive_parts(source)
     block.numbers.add(number)
     s = add_positive_part(block, (*index_tuple(source.index()), number), z)
     _pair_sources(block)[block.complementarity[s.index()]] = source
-    return s
+    return in_unit_of(s, z)
 
 
 def last_number(source) -> int:

@@ -1,9 +1,9 @@
-"""An IDAES flowsheet (a reactor with a saturating level controller) on more and more elements: time of each phase, and memory.
+"""An IDAES flowsheet (a reactor with a saturating level controller) on more and more elements: time and memory of each phase.
 
     python docs/benchmarks/idaes_size/run.py [--fresh] [--only 60]
 
-Each size runs in a process of its own with a time limit.  Writes rows.csv and summary.png beside this file; sizes that have a row
-are skipped.  Needs the extra [idaes].
+Each run is in a process of its own with a time limit.  Writes rows.csv and summary.png beside this file; runs that have a row are
+skipped.  Seconds are CPU seconds, memory is the largest until the end of the phase.  Needs the extra [idaes].
 """
 
 import argparse
@@ -11,7 +11,7 @@ import json
 import resource
 import sys
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
@@ -22,61 +22,80 @@ from benchmarks.common.rows import Rows
 from matplotlib.figure import Figure
 
 HERE = Path(__file__).parent
-SIZES, NCP, LIMIT = (20, 60, 120, 400), 3, 200
+#: Numbers of elements; the last one has 100,000 equations.
+SIZES, NCP, LIMIT = (20, 60, 120, 400, 710), 3, 900
 #: Columns of seconds; 'march' is ``simulate``.
 PHASES = ('build', 'discretise', 'initialise', 'march', 'solve')
 COLUMNS = (
-    *('elements', *(f'{phase} (s)' for phase in PHASES)),
-    *('equations', 'pairs', 'status', 'largest error of a time (s)', 'memory (MB)'),
+    *('elements', 'variant', *(f'{phase} (s)' for phase in PHASES), *(f'{phase} (MB)' for phase in PHASES)),
+    *('equations', 'pairs', 'status', 'largest error of a time (s)', 'error of the final volume (m3)'),
 )
+#: What is run, with the sizes for which it is.
+VARIANTS = {'all calls': SIZES, 'without review': SIZES[-1:], 'without simulate': SIZES[-1:], 'smooth, fixed grid': SIZES}
 
 
-def measure(nfe):
-    """One row: seconds of each phase, sizes, verdict, memory."""
+def measure(nfe, variant):
+    """One row: seconds and memory of each phase, sizes, verdict."""
     import idaes_level  # IDAES takes seconds to import
     import pyomo.environ as pyo
 
     import pyomo_fesd
 
-    row, clock = {'elements': nfe}, perf_counter()
+    row, clock = {'elements': nfe, 'variant': variant}, process_time()
 
     def done(phase):
         nonlocal clock
-        row[f'{phase} (s)'] = round(perf_counter() - clock, 3)
-        clock = perf_counter()
+        row[f'{phase} (s)'] = round(process_time() - clock, 3)
+        row[f'{phase} (MB)'] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+        clock = process_time()
 
-    m = idaes_level.exact(idaes_level.build())
+    smooth = variant.startswith('smooth')
+    m = idaes_level.build() if smooth else idaes_level.exact(idaes_level.build())
     done('build')
-    idaes_level.move(m, nfe, NCP)
+    if smooth:
+        pyo.TransformationFactory('dae.collocation').apply_to(m.fs, wrt=m.fs.time, nfe=nfe, ncp=NCP)
+    else:
+        idaes_level.move(m, nfe, NCP)
     done('discretise')
     idaes_level.specify(m)
     done('initialise')
-    pyomo_fesd.simulate(m.fs)
-    done('march')
-    results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=True)
+    if smooth:
+        results = pyo.SolverFactory('casadi_ipopt').solve(m, load_solutions=True)
+    else:
+        if variant != 'without simulate':
+            pyomo_fesd.simulate(m.fs)
+            done('march')
+        options = {'warm_start': variant != 'without simulate', 'review': variant != 'without review'}
+        results = pyo.SolverFactory('mpec_hybrid').solve(m, **options)
     done('solve')
-    report, (exact, _) = pyomo_fesd.report(m), idaes_level.reference()
-    found = idaes_level.changes(m)
-    right = [c.now for c in found] == [c.now for c in exact]
-    return row | {
+    report, (exact, end) = pyomo_fesd.report(m), idaes_level.reference()
+    row |= {
         'equations': report['constraints'],
         'pairs': report['pairs'],
-        'status': str(results.solver.termination_condition) if right else 'wrong switches',
-        'largest error of a time (s)': max(abs(a.time - b.time) for a, b in zip(found, exact)) if right else None,
-        'memory (MB)': resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
+        'status': str(results.solver.termination_condition),
+        'error of the final volume (m3)': abs(m.fs.cstr.volume[m.fs.time.last()].value - end),
     }
+    if not smooth:
+        found = idaes_level.changes(m)
+        if [c.now for c in found] == [c.now for c in exact]:
+            row['largest error of a time (s)'] = max(abs(a.time - b.time) for a, b in zip(found, exact))
+        else:
+            row['status'] += ', wrong switches'
+    return row
 
 
 def draw(table):
     """Seconds of each phase over the number of elements."""
     figure = Figure(figsize=(6, 4), layout='constrained')
-    axis = figure.subplots()
+    axis, smooth = figure.subplots(), table[table['variant'] == 'smooth, fixed grid']
+    table = table[table['variant'] == 'all calls']
     for phase in PHASES:
         axis.loglog(table['elements'], table[f'{phase} (s)'], 'o-', label='simulate' if phase == 'march' else phase)
+    axis.loglog(smooth['elements'], smooth['solve (s)'], 'k--', label='solve, smooth, fixed grid')
     axis.set_xticks(table['elements'], table['elements'], minor=False)
     axis.set_xticks([], minor=True)
     axis.set_xlabel('elements')
-    axis.set_ylabel('time (s)')
+    axis.set_ylabel('CPU time (s)')
     axis.legend()
     return figure
 
@@ -86,16 +105,16 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--only', type=int, help="one number of elements")
     parser.add_argument('--fresh', action='store_true', help="delete the existing rows first")
-    parser.add_argument('--measure', type=int, help=argparse.SUPPRESS)
+    parser.add_argument('--measure', nargs=2, help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     if chosen.measure:
-        print(json.dumps(measure(chosen.measure)))
+        print(json.dumps(measure(int(chosen.measure[0]), chosen.measure[1])))
         return
-    rows = Rows(HERE / 'rows.csv', ('elements',), COLUMNS, fresh=chosen.fresh)
-    for nfe in SIZES if chosen.only is None else (chosen.only,):
-        if (nfe,) not in rows:
-            found, status = json_lines(__file__, '--measure', nfe, limit=LIMIT)
-            row = found[-1] if found else {'elements': nfe, 'status': status}
+    rows = Rows(HERE / 'rows.csv', ('elements', 'variant'), COLUMNS, fresh=chosen.fresh)
+    for nfe in reversed(SIZES) if chosen.only is None else (chosen.only,):
+        for variant in (v for v, sizes in VARIANTS.items() if nfe in sizes and (nfe, v) not in rows):
+            found, status = json_lines(__file__, '--measure', nfe, variant, limit=LIMIT)
+            row = found[-1] if found else {'elements': nfe, 'variant': variant, 'status': status}
             print(row, flush=True)
             rows.add(row)
     draw(pd.read_csv(rows.path).sort_values('elements')).savefig(HERE / 'summary.png', dpi=150)

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from pyomo.core.base.block import BlockData
 
-from pyomo_fesd.core import add_smallest, declare_smallest
+from pyomo_fesd.core import add_smallest, declare_smallest, without_unit
 from pyomo_fesd.dcs.reading import ModeSystem
 
 NAME = 'stewart'
@@ -45,10 +45,11 @@ def declare(block: BlockData, sets: tuple, regions: int) -> None:
 def add(block: BlockData, index: tuple, system: ModeSystem) -> None:
     """Add one time of one Disjunction."""
     patterns = [pattern for owned in system.regions.geometry.patterns for pattern in owned]
+    functions = [without_unit(c) for c in system.regions.functions]
     add_smallest(
         block,
         index,
-        [sum(-c if sign > 0 else c for sign, c in zip(pattern, system.regions.functions)) for pattern in patterns],
+        [sum(-c if sign > 0 else c for sign, c in zip(pattern, functions)) for pattern in patterns],
     )
 
 
