@@ -136,7 +136,7 @@ def reference(case, nfe, start):
     (case.exact or case.switch)(m)
     wrt = case.wrt(m)
     ends = [*case.stages, wrt.last()]
-    return integrate([(end, Equations(m, wrt, end, start)) for end in ends])
+    return integrate([(end, Equations(m, wrt, end, start)) for end in ends], **case.reference)
 
 
 def end_error(m, exact):

@@ -1,7 +1,7 @@
 """One model of the study."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Case:
         times at which inputs change, points of the grid
     mode : callable (model, label) -> hashable, or None
         the mode of a switch that :func:`pyomo_fesd.switches` does not list, as exact limits
+    reference : dict
+        options of the reference
     note : str
         what is not as published, and why
     """
@@ -40,6 +42,7 @@ class Case:
     inputs: Callable | None = None
     stages: tuple = ()
     mode: Callable | None = None
+    reference: dict = field(default_factory=dict)
     note: str = ''
 
 
