@@ -71,12 +71,14 @@ def integrate(stages, tolerance=1e-7, longest=0.05, slack=1e-9, begin=(1e-6, 1e-
     Failure
         where no mode holds, as in sliding, or steps vanish
     """
-    path, t, w, mode = Path(), 0.0, None, None
+    path, t, w, mode, largest = Path(), 0.0, None, None, 0.0
     horizon = stages[-1][0]
     for end, equations in stages:
         run = _Run(equations, tolerance, slack, horizon, begin)
         x = run.first if w is None else w[equations.states]
+        run.size = np.maximum(run.size, largest)
         t, w, mode = run.to(end, t, x, mode, longest * horizon, path)
+        largest = run.size
     path.end = {equations.names[p]: w[p] for p in equations.states}
     path.scale = dict(zip((equations.names[p] for p in equations.states), run.size))
     return path
