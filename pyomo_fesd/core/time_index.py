@@ -29,7 +29,7 @@ def ancestry(data):
 
 def index_sets(component) -> list:
     """Return the sets that index a component itself, in their order."""
-    return list(component.index_set().subsets()) if component.is_indexed() else []
+    return list(component.index_set().subsets(expand_all_set_operators=False)) if component.is_indexed() else []
 
 
 def is_discretisation_equation(constraint) -> bool:

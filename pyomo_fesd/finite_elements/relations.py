@@ -13,6 +13,7 @@ from typing import NamedTuple
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint
 from pyomo.core.base.constraint import ConstraintData
+from pyomo.core.base.var import VarData
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
 
@@ -21,10 +22,11 @@ from pyomo_fesd.finite_elements.algebraic_graph import rule_of
 
 
 class Relation(NamedTuple):
-    """An equation, or the pair of a positive part (``equation`` is None), with its variables."""
+    """An equation, or the pair of a positive part (``equation`` is None), which determines that part only; with its variables."""
 
     equation: ConstraintData | None
     variables: list
+    part: VarData | None = None
 
 
 class Relations:
@@ -49,9 +51,9 @@ class Relations:
         self._is_algebraic = is_algebraic
         self._rules = rules
         self._by_label = defaultdict(ComponentMap)
-        for label, equation, variables in _all_relations(model, times, rules):
+        for label, relation in _all_relations(model, times, rules):
             if label in labels:
-                relation = Relation(equation, variables())
+                relation = relation()
                 if is_known is None or all(map(is_known, relation.variables)):
                     self._add(label, relation)
 
@@ -75,11 +77,17 @@ class Relations:
         return [v for v in found if v in left], kept
 
     def _without_results(self, label, relations, wanted):
-        """Remove each variable that occurs in one relation only, with this relation, unless it is wanted or a part of a pair."""
+        """Remove each variable that occurs in one relation only, with this relation, unless it is wanted or a part of a pair.
+
+        A pair is not solved for its argument: that stays, and is undetermined if it occurs nowhere else.
+        """
         while True:
             number = Counter(id(v) for relation in relations for v in ComponentSet(relation.variables))
             results = ComponentSet(
-                v for relation in relations for v in relation.variables if number[id(v)] == 1 and self._is_result(v, label)
+                v
+                for relation in relations
+                for v in relation.variables
+                if number[id(v)] == 1 and (relation.part is None or relation.part is v) and self._is_result(v, label)
             )
             kept = [relation for relation in relations if not any(v in results and v not in wanted for v in relation.variables)]
             if len(kept) == len(relations):
@@ -93,14 +101,14 @@ class Relations:
 
 
 def _all_relations(model, times, rules) -> Iterator[tuple]:
-    """``(label, equation or None, function that gives its variables)``."""
+    """``(label, function that returns the Relation)``."""
     for equation in model.component_data_objects(Constraint, active=True, descend_into=Block):
         if equation.equality and not is_discretisation_equation(equation):
-            yield times.time(equation), equation, lambda c=equation: variables_in(c.body)
+            yield times.time(equation), lambda c=equation: Relation(c, variables_in(c.body))
     for s, rule in rules.items():
         if rule.ctype is Complementarity:
             for v in s.values():
-                yield times.time(v), None, lambda v=v, rule=rule: variables_in_sides(rule[v.index()]._args)
+                yield times.time(v), lambda v=v, rule=rule: Relation(None, variables_in_sides(rule[v.index()]._args), v)
 
 
 def variables_in(expr) -> list:

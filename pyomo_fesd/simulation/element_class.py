@@ -64,6 +64,10 @@ class ElementClass:
     def _stepper(self):
         return ActiveSetStepper(self._residuals, self._tau) if self._residuals.complete else None
 
+    def begin_pass(self) -> None:
+        """Begin a pass: values of the last element are no start for the first one."""
+        self._values = None
+
     def find_initial_values(self, equations: ElementEquations) -> bool:
         """Find and write the values of the first time by Newton's method; returns whether it succeeded."""
         if self._stepper is None:
@@ -81,20 +85,26 @@ class ElementClass:
     ) -> tuple[float, ElementEnd] | None:
         """Solve an element of at most the length ``most`` that goes on with the active set of ``before``.
 
-        Returns (length, ElementEnd), or None if the active set is unknown or does not hold; ``start`` returns values of the
-        unknowns for the first element of the class.
+        Conditions that ``before`` does not have, such as those that a model states after the first time only, are guessed from the
+        values at the left boundary.  Returns (length, ElementEnd), or None if the active set is unknown or does not hold; ``start``
+        returns values of the unknowns for the first element of the class.
         """
         if before.active is None or self._stepper is None:
             return None
         names = self._stepper.names
-        if not before.active.keys() >= set(names):
-            return None
-        active = np.array([before.active[name] for name in names], dtype=bool)
+        goes_on = before.active.keys() >= set(names)
+        values = self._values if goes_on and self._values is not None else start()
+        guess = {} if goes_on else self._guess(equations, values)
+        active = np.array([before.active.get(name, guess.get(name)) for name in names], dtype=bool)
         event = None if before.event is None or before.event[0] not in names else 2 * names.index(before.event[0]) + before.event[1]
         left = before.values if before.element_class is self and before.values is not None else self._stepper.unknown_values
-        values = self._values if self._values is not None else start()
         with phase(self._timer, 'newton'):
             return self._newton(equations, active, left, most, values, event)
+
+    def _guess(self, equations, values):
+        """For each condition whether its H (else its G) is the smaller side at some values."""
+        self._residuals.set_known(known_values(equations))
+        return dict(zip(self._stepper.names, self._stepper.active_set(self._residuals.point(values)).tolist()))
 
     def _newton(self, equations, active, left, most, values, event=None):
         self._residuals.set_known(known_values(equations))
@@ -111,8 +121,7 @@ class ElementClass:
 
     def mpcc_step(self, equations: ElementEquations, most: float, options: dict, least: float = 0.0):
         """Solve the MPCC with a length from ``least`` to ``most``; returns the ``extra_info`` of its results, and the length."""
-        if self._values is not None:
-            self.mpcc.set_start(self._values)
+        self.mpcc.set_start([v.value for v in equations.unknown] if self._values is None else self._values)
         with phase(self._timer, 'mpcc'):
             answer = self.mpcc.solve(equations, most / self.nominal, least / self.nominal, **options)
         return answer, self.mpcc.length * self.nominal

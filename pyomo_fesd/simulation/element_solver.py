@@ -80,6 +80,8 @@ class ElementSolver:
         """Begin a pass at the first time."""
         self._jumps.begin()
         self._impacts.begin()
+        for element_class in self._classes.values():
+            element_class.begin_pass()
         for modes in self._hysteresis:
             modes.begin(self._first)
         self._end = ElementEnd(self._reader.active_set(self._first))

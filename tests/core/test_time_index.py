@@ -56,6 +56,12 @@ def test_a_product_that_was_made_before_is_taken_apart(m):
     assert TimeIndex(m.t).split(m.v['a', 0.5]) == (0.5, 'v[a,*]')
 
 
+def test_a_set_made_by_an_operator_is_one_set(m, caplog):
+    m.v = pyo.Var(m.t, m.i - pyo.Set(initialize=['b']))
+    assert time_position(m.v, m.t) == 0
+    assert not caplog.messages
+
+
 def test_a_scalar_has_no_time(m):
     m.v = pyo.Var()
     assert time_position(m.v, m.t) is None and not is_indexed_by(m.v, m.t)

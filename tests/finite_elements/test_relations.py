@@ -3,6 +3,7 @@
 import pyomo.environ as pyo
 import pytest
 from pyomo.common.collections import ComponentMap
+from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import TimeIndex
 from pyomo_fesd.finite_elements.relations import Relations
@@ -42,3 +43,15 @@ def test_inequalities_determine_nothing(model):
 
 def test_a_relation_with_an_unknown_variable_determines_nothing(model):
     assert closure(model, [model.w[1]], lambda v: v.parent_component() is not model.x) == (set(), set())
+
+
+def test_the_argument_of_a_positive_part_stays_where_nothing_determines_it(model):
+    # a pair determines p = max(0, w + d), not d
+    m = model
+    m.p, m.d = pyo.Var(m.t, initialize=0), pyo.Var(m.t, initialize=0)
+    m.part = Complementarity(m.t, rule=lambda m, t: complements(m.p[t] >= 0, m.p[t] - m.w[t] - m.d[t] >= 0))
+    rules = ComponentMap([(m.p, m.part)])
+    relations = Relations(m, TimeIndex(m.t), {1}, rules, lambda v, label: v.parent_component() is not m.x)
+    tied, found = relations.closure(1, [m.p[1]])
+    assert {v.name for v in tied} == {'p[1]', 'w[1]', 'd[1]'}
+    assert {getattr(r.equation, 'name', None) for r in found} == {None, 'of_w[1]'}

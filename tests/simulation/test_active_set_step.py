@@ -227,6 +227,21 @@ def test_more_rows_than_unknowns_on_a_slide_by_gauss(monkeypatch):
         assert m.x[1.5].value == pytest.approx(0, abs=1e-12)
 
 
+def test_conditions_that_begin_after_the_first_time():
+    """dx/dt = max(0, 1 - x) - x/2 after the first time only, x = (2/3)(1 - exp(-3 t/2))."""
+    m = over_time(1.0, x=0)
+    m.u = pyo.Var(m.t, initialize=0)
+
+    def part(m, t):
+        return Complementarity.Skip if t == 0 else complements(m.u[t] >= 0, m.u[t] >= 1 - m.x[t])
+
+    m.part = Complementarity(m.t, rule=part)
+    m.balance = pyo.Constraint(m.t, rule=lambda m, t: pyo.Constraint.Skip if t == 0 else m.dx[t] == m.u[t] - m.x[t] / 2)
+    m, timer = simulated(transform(m, 4, 3))
+    assert calls(timer, 'mpcc') == 0
+    assert m.x[1].value == pytest.approx(2 / 3 * (1 - exp(-1.5)), abs=1e-6)
+
+
 def test_where_newton_fails_the_mpcc_is_solved():
     # the ends of Gauss' elements leave the derivatives of two complementary states open
     m, timer = simulated(transform(relay_of_states.build(), 8, 3, scheme=LEGENDRE))

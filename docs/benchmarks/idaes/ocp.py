@@ -19,6 +19,8 @@ from benchmarks.common.rows import Rows
 from benchmarks.idaes.cases.reactors import dilute
 from benchmarks.idaes.reference import Equations, integrate
 
+import pyomo_fesd  # noqa: F401  registers the transformations
+
 HERE = Path(__file__).parent
 #: Ends of control stages; the largest concentration of A; bounds of the flow.
 STAGES, LIMIT, FLOW = (1.0, 2.0, 3.0, 4.0, 5.0), 2.0, (0.5, 2.0)

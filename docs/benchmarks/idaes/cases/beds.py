@@ -84,6 +84,50 @@ def throttle(m):
     )
 
 
+# Temperature-swing adsorption, one of its time sets, with the length of the heating step free: milder heating of a warm bed
+
+
+def swing(nfe):
+    from idaes.models_extra.temperature_swing_adsorption.tests import test_fixed_bed_tsa0d as test
+
+    m = fixture(test.TestTsaZeolite, 'model')
+    test.FixedBedTSA0DInitializer().initialize(m.fs.unit, heating_time_guess=70000, cooling_time_guess=110000)
+    return m
+
+
+def milder_heating(m):
+    unit, step = m.fs.unit, m.fs.unit.heating
+    step.time.fix()
+    step.fc_temperature_eq.deactivate()
+    step.energy_balance_ode.deactivate()
+    step.lower_by = pyo.Var(step.time_domain, initialize=0)
+    area = unit.heat_transfer_coeff * unit.area_heat_transfer
+
+    def energy(b, t):
+        if t == step.time_domain.first():
+            return pyo.Constraint.Skip
+        return step.energy_balance_ode[t].body + area * step.lower_by[t] * step.time == step.energy_balance_ode[t].upper
+
+    step.energy = pyo.Constraint(step.time_domain, rule=energy)
+    step.milder = Disjunction(
+        step.time_domain,
+        rule=lambda b, t: [
+            [step.temperature[t] <= 430, step.lower_by[t] == 0],
+            [step.temperature[t] >= 430, step.lower_by[t] == 20],
+        ],
+    )
+
+
+def free_length(m):
+    m.fs.unit.heating.time.unfix()
+    m.fs.unit.heating.fc_temperature_eq.activate()
+
+
+def length_of_the_step(m):
+    """The variable, and the name and value of the state at the end that determine each other."""
+    return m.fs.unit.heating.time, m.fs.unit.heating.temperature[1].name, m.fs.unit.temperature_desorption.value
+
+
 CASES = {
     'TGA': Case('models_extra/gas_solid_contactors/flowsheets/dyn_TGA_example.py: main', tga, leaner_gas, flowsheet_time, (100,)),
     'fixed bed 0D': Case(
@@ -99,5 +143,14 @@ CASES = {
         throttle,
         flowsheet_time,
         (3,),
+    ),
+    'temperature-swing adsorption': Case(
+        'models_extra/temperature_swing_adsorption/tests/test_fixed_bed_tsa0d.py: TestTsaZeolite',
+        swing,
+        milder_heating,
+        lambda m: m.fs.unit.heating.time_domain,
+        (20,),
+        freed=free_length,
+        shot=length_of_the_step,
     ),
 }

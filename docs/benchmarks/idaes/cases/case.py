@@ -1,7 +1,7 @@
 """One model of the study."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,12 @@ class Case:
         times at which inputs change, points of the grid
     mode : callable (model, label) -> hashable, or None
         the mode of a switch that :func:`pyomo_fesd.switches` does not list, as exact limits
-    note : str
-        what is not as published, and why
+    freed : callable (model), or None
+        lines between the simulation and the solve
+    shot : callable model -> (variable, name of a state at the end, its value), or None
+        what the reference finds by shooting where ``freed`` has made it free
+    reference : dict
+        options of the reference
     """
 
     script: str
@@ -40,7 +44,9 @@ class Case:
     inputs: Callable | None = None
     stages: tuple = ()
     mode: Callable | None = None
-    note: str = ''
+    freed: Callable | None = None
+    shot: Callable | None = None
+    reference: dict = field(default_factory=dict)
 
 
 def flowsheet_time(m):

@@ -180,7 +180,8 @@ def better_transfer(m):
     )
 
 
-# Gas pipeline: demand falls while the pressure at its end is low
+# Gas pipeline: demand falls while the pressure at its end is low.  Forward differences in space and a pressure that is given at
+# the inlet make a DAE of higher index: nine states, five degrees of freedom
 
 
 def pipeline(nfe):
@@ -225,6 +226,7 @@ CASES = {
         pipeline,
         yielding_demand,
         flowsheet_time,
-        (20,),
+        (20, 40),
+        reference={'begin': (1, 10)},
     ),
 }

@@ -125,7 +125,7 @@ def _discretisation(m, time):
 
 def _at_label(component, time, label):
     """(index, data) of an indexed component at a time."""
-    subsets, position = list(component.index_set().subsets()), 0
+    subsets, position = list(component.index_set().subsets(expand_all_set_operators=False)), 0
     for subset in subsets:
         if subset is time:
             break
@@ -144,7 +144,7 @@ def _derivatives(m, time, label):
 
 def _disjunctions(m, time, label):
     for disjunction in m.component_objects(Disjunction, active=True):
-        if disjunction.is_indexed() and any(s is time for s in disjunction.index_set().subsets()):
+        if disjunction.is_indexed() and any(s is time for s in disjunction.index_set().subsets(expand_all_set_operators=False)):
             yield from (data for _, data in _at_label(disjunction, time, label) if data.active)
 
 

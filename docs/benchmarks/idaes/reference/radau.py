@@ -17,6 +17,8 @@ A = np.array(
     ]
 )
 ORDER, NEWTON_STEPS = 5, 25
+#: Largest residual of a solution relative to the terms of its row: round-off.
+EXACT = 1e-13
 #: Unknowns of a step up to which a dense factorisation is faster.
 DENSE = 200
 
@@ -47,7 +49,7 @@ class Path:
     steps: int = 0
 
 
-def integrate(stages, tolerance=1e-7, longest=0.05, slack=1e-9):
+def integrate(stages, tolerance=1e-7, longest=0.05, slack=1e-9, begin=(1e-6, 1e-3, 1)):
     """Integrate over stages, each with its own equations.
 
     Parameters
@@ -60,18 +62,23 @@ def integrate(stages, tolerance=1e-7, longest=0.05, slack=1e-9):
         step, relative to the horizon
     slack : float
         by which a guard may be negative, relative to its size at the beginning
+    begin : tuple of float
+        lengths tried for the first step, parts of 1e-3 ``longest``.  Where equations tie derivatives of states (a higher index),
+        round-off grows by 1/h or more in a short step
 
     Raises
     ------
     Failure
         where no mode holds, as in sliding, or steps vanish
     """
-    path, t, w, mode = Path(), 0.0, None, None
+    path, t, w, mode, largest = Path(), 0.0, None, None, 0.0
     horizon = stages[-1][0]
     for end, equations in stages:
-        run = _Run(equations, tolerance, slack, horizon)
+        run = _Run(equations, tolerance, slack, horizon, begin)
         x = run.first if w is None else w[equations.states]
+        run.size = np.maximum(run.size, largest)
         t, w, mode = run.to(end, t, x, mode, longest * horizon, path)
+        largest = run.size
     path.end = {equations.names[p]: w[p] for p in equations.states}
     path.scale = dict(zip((equations.names[p] for p in equations.states), run.size))
     return path
@@ -80,8 +87,8 @@ def integrate(stages, tolerance=1e-7, longest=0.05, slack=1e-9):
 class _Run:
     """Steps with the equations of one stage."""
 
-    def __init__(self, equations, tolerance, slack, horizon):
-        self.eq, self.tolerance, self.slack, self.horizon = equations, tolerance, slack, horizon
+    def __init__(self, equations, tolerance, slack, horizon, begin):
+        self.eq, self.tolerance, self.slack, self.horizon, self.begin = equations, tolerance, slack, horizon, begin
         self.first, self.size = equations.first, np.abs(equations.first)
         count, n = len(equations.states), len(equations.names)
         numbers, ones = np.arange(count), np.ones(count)
@@ -122,7 +129,7 @@ class _Run:
     def _begin(self, x, h, guess, mode):
         """A mode that holds over a first short step, its values and length; the present mode is tried first."""
         for candidate in sorted(self.eq.modes, key=lambda other: (_changes(other, mode), other)):
-            for length in (h * 1e-6, h * 1e-3, h):
+            for length in (part * h for part in self.begin):
                 try:
                     w = self._step(x, length, guess, candidate)
                 except NoStep:
@@ -136,10 +143,10 @@ class _Run:
         """The end of a mode within the step, and the mode that follows."""
 
         def least(length):
-            return min(self.eq.guards(self._step(x, length, w, mode)[2], mode))
+            at = w if length == 0 else self._step(x, length, w, mode)
+            return min(self.eq.guards(at[2], mode))
 
-        at_left = 1e-9 * h
-        length = at_left if least(at_left) <= 0 else brentq(least, at_left, h, xtol=1e-14 * self.horizon, rtol=1e-14)
+        length = 1e-9 * h if least(0) <= 0 else brentq(least, 0, h, xtol=1e-14 * self.horizon, rtol=1e-14)
         w = self._step(x, length, w, mode)
         x, t = w[2][self.eq.states], t + length
         others = [other for other in self.eq.modes if other != mode]
@@ -183,6 +190,8 @@ class _Run:
             residual, matrix = self._system(w, x, h, mode)
             if not np.isfinite(residual).all():
                 raise NoStep
+            # at rest rates consist of round-off, and their changes are as large: no row says more then
+            exact = (np.abs(residual) <= EXACT * (abs(matrix) @ np.abs(w.ravel()))).all()
             change = _solve(matrix, residual).reshape(3, n)
             damping = 1.0
             while damping > 1e-3 and not np.isfinite(self._residual(w - damping * change, x, h, mode)).all():
@@ -190,7 +199,7 @@ class _Run:
             w = w - damping * change
             size = self._size_of(w, change, h)
             algebra = (np.abs(change).max(axis=0) / (np.abs(w).max(axis=0) + 1e-9 * np.abs(w).max())).max()
-            if damping == 1 and algebra < 1e-7 and (size < 1e-12 or (size < 1e-8 and size > 0.3 * previous)):
+            if damping == 1 and (exact or algebra < 1e-7) and (size < 1e-12 or (size < 1e-8 and size > 0.3 * previous)):
                 return w
             previous = size
         raise NoStep
