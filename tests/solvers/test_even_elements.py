@@ -8,7 +8,7 @@ from pyomo.common.timing import HierarchicalTimer
 
 import pyomo_fesd
 from pyomo_fesd.mpcc import compile_mpcc, read_mpcc
-from pyomo_fesd.mpcc.algorithm.branches import Branches
+from pyomo_fesd.mpcc.algorithm.evenness import Evenness
 from pyomo_fesd.solvers.even_elements import even_elements
 from tests.diagnostics.test_uneven_elements import rising
 
@@ -33,7 +33,7 @@ def uneven(monkeypatch):
     pyomo_fesd.simulate(m)
     m.x[0].fix(-0.15)
     with monkeypatch.context() as patch:
-        patch.setattr(Branches, 'even_out', lambda self: None)
+        patch.setattr(Evenness, 'improve', lambda self: None)
         pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=True, review=False)
     lengths = pyomo_fesd.element_lengths(m)['length']
     assert lengths.max() > 5 * lengths.min()

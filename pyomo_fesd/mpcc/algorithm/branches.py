@@ -34,8 +34,6 @@ SEARCH_RADIUS = 1e3
 UNBOUNDED = 1e15
 #: A variable nearer to its lower bound than this is at it.
 AT_BOUND = 1e-6
-#: A point is more even than another if its deviations are smaller by this part.
-EVENER = 1e-3
 #: A more even solution may cost this much more, relative: the error of uneven elements, not another minimum.
 AS_GOOD = 1e-4
 
@@ -53,15 +51,13 @@ class Branches:
     patient : bool
         whether the first attempt at a branch, too, has the iterations of the second one: where points can be completed, branches
         are worth more than further relaxations
-    even : callable or None
-        see ``Setup``
     """
 
-    def __init__(self, subsolves, gap, global_lpec, patient=False, even=None):
+    def __init__(self, subsolves, gap, global_lpec, patient=False):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
         self._attempts, self._solved, self._exhausted = Counter(), {}, {}
-        self._first, self._even = SECOND if patient else FIRST, even
+        self._first = SECOND if patient else FIRST
 
     # called by the algorithm
 
@@ -115,7 +111,7 @@ class Branches:
         neighbours = list(self._c.neighbours)
         while neighbours:
             point, neighbour = self.run.point, neighbours.pop(0)
-            zero = self._zero_sides(point, neighbour)
+            zero = self.zero_sides(point, neighbour)
             if zero is not None and not self.tried(zero):
                 start = point.w.copy()
                 start[neighbour.starts] = neighbour.at
@@ -130,9 +126,9 @@ class Branches:
         """
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for neighbour in self._c.neighbours:
-            zero = self._zero_sides(point, neighbour) if neighbour.short.size else None
+            zero = self.zero_sides(point, neighbour) if neighbour.short.size else None
             found = None if zero is None else self.certified(point.w, zero, max_iter=SECOND, below=point.f)
-            if _is_below(found, enough):
+            if is_below(found, enough):
                 return found
         return None
 
@@ -140,7 +136,7 @@ class Branches:
         """Go on without guide bounds from a point below the incumbent that only these keep from descending."""
         if end is None or end.certificate.grade is not Stationarity.LIMITED:
             return
-        if _is_below(end, self.run.point.f - PROGRESS * max(1.0, abs(self.run.point.f))) and self._c.widen():
+        if is_below(end, self.run.point.f - PROGRESS * max(1.0, abs(self.run.point.f))) and self._c.widen():
             self._release(end)
 
     def release(self):
@@ -151,78 +147,7 @@ class Branches:
         zero = self._subsolves.sets(point.w, self._tolerances.biactive).zero
         self.improve_from(self.certified(point.w, zero, max_iter=SECOND), True)
 
-    def even_out(self):
-        """From a certified incumbent with variables above their guide bounds, go to branches where they are lower.
-
-        The values of the pairs stay as they are in their order; the method's own variables, free in a solution, are shared evenly:
-        at once if the caller can (``Setup.even``), else from one neighbouring branch to the next.
-        """
-        point, tried = self.run.point, set()
-        if point is None or not point.certificate.certified or not self._is_uneven(point.w):
-            return
-        evened = self._evened(point)
-        if evened is not None:
-            self.run.point = evened
-            return
-        while point is not None:
-            self.run.point = point
-            point = self._more_even(point, tried)
-
-    def _evened(self, point):
-        """The solution near the point that the caller makes of this one; None if there is none that is more even."""
-        start = None if self._even is None else self._even(point.w)
-        if start is None:
-            return None
-        self._subsolves.note("shared evenly", start)
-        return self._if_more_even(start, self._subsolves.sets(start, self._tolerances.biactive).zero, point, np.inf)
-
-    def _is_uneven(self, w):
-        c = self._c
-        return bool((w[c.guided] > c.guide_ubx[c.guided] + AT_BOUND).any())
-
-    def _unevenness(self, w):
-        c, guided = self._c, self._c.guided
-        return float(((w[guided] - (c.guide_lbx[guided] + c.guide_ubx[guided]) / 2) ** 2).sum())
-
-    def _more_even(self, point, tried):
-        """A certified solution of a neighbouring branch that is more even; small variables are the first to change sides."""
-        candidates = [n for n in self._c.neighbours if n.short.size]
-        enough = point.f - PROGRESS * max(1.0, abs(point.f))
-        for neighbour in sorted(candidates, key=lambda n: point.w[n.short].max()):
-            zero = self._zero_sides(point, neighbour, always=True)
-            if zero is None or zero.tobytes() in tried:
-                continue
-            tried.add(zero.tobytes())
-            found = self._if_more_even(point.w, zero, point, enough)
-            if found is not None:
-                return found
-        return None
-
-    def _if_more_even(self, start, zero, point, worth):
-        """The certified solution that the branch ``zero`` leads to from ``start``, if it is more even than ``point``, or better.
-
-        An objective may depend on the method's own variables: then its least lies in a branch further on.  The descent goes there
-        from a solution that is not above ``worth``.
-        """
-        size = max(1.0, abs(point.f))
-        found = self.certified(start, zero, max_iter=SECOND)
-        if not _is_below(found, point.f + AS_GOOD * size):
-            return None
-        found = self._descended(found) if found.f <= worth else found
-        is_better = self._is_more_even(found.w, point.w) or _is_below(found, point.f - PROGRESS * size)
-        return found if found.certificate.certified and is_better else None
-
-    def _descended(self, point):
-        """The end of the descent from ``point``."""
-        end = point
-        while point is not None:
-            end, point = point, self._descend(point, True)
-        return end
-
-    def _is_more_even(self, w, before):
-        return self._unevenness(w) < self._unevenness(before) * (1 - EVENER)
-
-    def _zero_sides(self, point, neighbour, always=False):
+    def zero_sides(self, point, neighbour, always=False):
         """The zero sides of a neighbouring branch of ``point``; None if it need not be tried."""
         at_bound = np.any(point.w[neighbour.short] <= self._c.lbx[neighbour.short] + AT_BOUND)
         if neighbour.short.size and not at_bound and not always:
@@ -281,7 +206,7 @@ class Branches:
         end = None
         while point is not None:
             self._keep(point)
-            end, point = point, self._descend(point, final or self._gap.closed(point.f))
+            end, point = point, self.descend(point, final or self._gap.closed(point.f))
         return end
 
     def _keep(self, point):
@@ -290,7 +215,7 @@ class Branches:
         if best is None or (not point.certificate.certified, point.f) < (not best.certificate.certified, best.f):
             self.run.point = point
 
-    def _descend(self, point, worth):
+    def descend(self, point, worth):
         """A better point, or None; a point that is not ``worth`` a descent only gets the check of its certificate."""
         size = max(1.0, abs(point.f))
         enough = point.f - PROGRESS * size
@@ -308,7 +233,7 @@ class Branches:
         radius = self._tolerances.radius
         sets = self._subsolves.sets(w, self._tolerances.biactive)
         for _ in range(SHRINKS):
-            if _is_below(better, enough) or _settles(better, point):
+            if is_below(better, enough) or _settles(better, point):
                 return better
             radius *= SHRINK
             step = self._subsolves.lpec(w, sets, radius, point.equal)
@@ -316,7 +241,7 @@ class Branches:
                 return None
             reach = radius * np.maximum(1.0, np.abs(w))
             better = self.certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=self._first)
-        return better if _is_below(better, enough) or _settles(better, point) else None
+        return better if is_below(better, enough) or _settles(better, point) else None
 
     def _beyond(self, point, enough, tolerance, clear, limits=None):
         """A better point in the branch that the LPEC names if all sides below ``tolerance`` count as zero."""
@@ -327,7 +252,7 @@ class Branches:
         if not step.solved or step.descent <= clear:
             return None
         better = self._point(point.w + step.d, step.zero, None, False)
-        return better if _is_below(better, enough) else None
+        return better if is_below(better, enough) else None
 
     def _point(self, w, zero, duals, final, **more):
         """The solution of branch ``zero``, certified; None if it has none.
@@ -400,5 +325,6 @@ def _settles(better, point):
     return better is not None and better.certificate.certified and better.f <= point.f
 
 
-def _is_below(point, enough):
+def is_below(point, enough) -> bool:
+    """Return whether there is a point and its objective is at most ``enough``."""
     return point is not None and point.f <= enough

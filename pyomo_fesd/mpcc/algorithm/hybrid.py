@@ -12,6 +12,7 @@ from pyomo_fesd.core import DeferredInterrupt, interrupt_handled
 from pyomo_fesd.mpcc.algorithm.branches import Branches
 from pyomo_fesd.mpcc.algorithm.coincidences import Coincidences
 from pyomo_fesd.mpcc.algorithm.completions import Completions
+from pyomo_fesd.mpcc.algorithm.evenness import Evenness
 from pyomo_fesd.mpcc.algorithm.feasible_start import feasible_start
 from pyomo_fesd.mpcc.algorithm.gap_test import GapTest
 from pyomo_fesd.mpcc.algorithm.homotopy import Homotopy
@@ -53,7 +54,8 @@ class HybridSolver:
         self._subsolves = Subsolves(setup, Tolerances.of(self._options), self.run)
         self._gap = GapTest(self._options.gap_tol * 1e-2, self._options.gap_tol)
         search, patient = GLOBAL_LPEC_SEARCH[self._options.lpec](self._c), setup.complete is not None
-        self._branches = Branches(self._subsolves, self._gap, search, patient, setup.even)
+        self._branches = Branches(self._subsolves, self._gap, search, patient)
+        self._evenness = Evenness(self._subsolves, self._branches, setup.even)
         self._coincidences = Coincidences(self._subsolves, self._branches)
         completes = setup.complete is not None and self._c.has_objective
         self._completions = Completions(setup, self._subsolves, self._branches) if completes else None
@@ -114,7 +116,7 @@ class HybridSolver:
     def _settle(self):
         """Go to more even solutions and try all orders of changes, until neither leads on."""
         for _ in range(ROUNDS):
-            self._branches.even_out()
+            self._evenness.improve()
             before = self.run.point
             self._coincidences.settle()
             if self.run.point is before:

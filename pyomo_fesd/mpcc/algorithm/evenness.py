@@ -1,0 +1,97 @@
+"""Solutions that are more even: the method's own variables, free in a solution, are shared evenly.
+
+A variable with guide bounds may end far above them in a certified solution: a long piece, which is resolved badly.  The values of
+the pairs stay as they are in their order; either the caller shares the variables evenly at once (``Setup.even``), or neighbouring
+branches lead there, one after the other.
+
+Takes: a certified incumbent.
+Leaves: a certified one that is more even, or better.
+"""
+
+import numpy as np
+
+from pyomo_fesd.mpcc.algorithm.branches import AS_GOOD, AT_BOUND, PROGRESS, SECOND, is_below
+
+#: A point is more even than another if its deviations are smaller by this part.
+EVENER = 1e-3
+
+
+class Evenness:
+    """The evenness of one run's incumbent.
+
+    Parameters
+    ----------
+    subsolves : Subsolves
+    branches : Branches
+    even : callable or None
+        see ``Setup``
+    """
+
+    def __init__(self, subsolves, branches, even):
+        self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
+        self._subsolves, self._branches, self._even = subsolves, branches, even
+
+    def improve(self):
+        """From a certified incumbent with variables above their guide bounds, go to branches where they are lower."""
+        point, tried = self.run.point, set()
+        if point is None or not point.certificate.certified or not self._is_uneven(point.w):
+            return
+        evened = self._evened(point)
+        if evened is not None:
+            self.run.point = evened
+            return
+        while point is not None:
+            self.run.point = point
+            point = self._neighbour(point, tried)
+
+    def _is_uneven(self, w):
+        c = self._c
+        return bool((w[c.guided] > c.guide_ubx[c.guided] + AT_BOUND).any())
+
+    def _evened(self, point):
+        """The solution near the point that the caller makes of this one; None if there is none that is more even."""
+        start = None if self._even is None else self._even(point.w)
+        if start is None:
+            return None
+        self._subsolves.note("shared evenly", start)
+        return self._if_more_even(start, self._subsolves.sets(start, self._tolerances.biactive).zero, point, np.inf)
+
+    def _neighbour(self, point, tried):
+        """A certified solution of a neighbouring branch that is more even; small variables are the first to change sides."""
+        candidates = [n for n in self._c.neighbours if n.short.size]
+        enough = point.f - PROGRESS * max(1.0, abs(point.f))
+        for neighbour in sorted(candidates, key=lambda n: point.w[n.short].max()):
+            zero = self._branches.zero_sides(point, neighbour, always=True)
+            if zero is None or zero.tobytes() in tried:
+                continue
+            tried.add(zero.tobytes())
+            found = self._if_more_even(point.w, zero, point, enough)
+            if found is not None:
+                return found
+        return None
+
+    def _if_more_even(self, start, zero, point, worth):
+        """The certified solution that the branch ``zero`` leads to from ``start``, if it is more even than ``point``, or better.
+
+        An objective may depend on the method's own variables: then its least lies in a branch further on.  The descent goes there
+        from a solution that is not above ``worth``.
+        """
+        size = max(1.0, abs(point.f))
+        found = self._branches.certified(start, zero, max_iter=SECOND)
+        if not is_below(found, point.f + AS_GOOD * size):
+            return None
+        found = self._descended(found) if found.f <= worth else found
+        is_more_even = self._unevenness(found.w) < self._unevenness(point.w) * (1 - EVENER)
+        is_better = is_more_even or is_below(found, point.f - PROGRESS * size)
+        return found if found.certificate.certified and is_better else None
+
+    def _descended(self, point):
+        """The end of the descent from ``point``."""
+        end = point
+        while point is not None:
+            end, point = point, self._branches.descend(point, True)
+        return end
+
+    def _unevenness(self, w):
+        c, guided = self._c, self._c.guided
+        return float(((w[guided] - (c.guide_lbx[guided] + c.guide_ubx[guided]) / 2) ** 2).sum())
