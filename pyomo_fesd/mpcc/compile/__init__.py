@@ -5,8 +5,9 @@ Read in this order: ``read_mpcc`` (the model as pairs, decisions and hints), ``c
 decisions, terms as rows), ``nonlinear_parts`` (their canonical form), ``round_off`` (constants in which fixed values cancel),
 ``model_rows`` (all of it), ``grouped_rows`` (classes of equal form), ``row_classes`` with ``elementwise`` and ``row_functions``
 (values and derivatives), ``scaling``, ``sizes`` and ``natural_units`` (factors from the model's own numbers), ``assemble``,
-``scaled_functions``, ``model_values`` (bounds and starts), ``mpcc_functions`` (the result), ``derivatives`` (chain rule for all
-NLPs), ``staleness`` (changes of the model after it was compiled), ``nl_file`` (a file to keep).
+``hint_indices`` with ``arrival_indices`` (hints by positions), ``scaled_functions``, ``model_values`` (bounds and starts),
+``mpcc_functions`` (the result), ``derivatives`` (chain rule for all NLPs), ``staleness`` (changes of the model after it was compiled),
+``nl_file`` (a file to keep).
 """
 
 from pyomo_fesd.mpcc.compile.assemble import NATURAL_UNITS

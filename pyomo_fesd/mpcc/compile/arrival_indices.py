@@ -8,7 +8,7 @@ from itertools import count
 
 import numpy as np
 
-from pyomo_fesd.mpcc.compile.mpcc_functions import ArrivalIndices, MoveIndices, OptionIndices, PlaceIndices, ToggleIndices
+from pyomo_fesd.mpcc.compile.hint_indices import ArrivalIndices, MoveIndices, OptionIndices, PlaceIndices, ToggleIndices
 
 
 def arrival_indices(arrivals, pairs, columns) -> list[ArrivalIndices]:

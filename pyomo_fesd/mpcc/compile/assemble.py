@@ -13,16 +13,15 @@ from scipy import sparse
 
 from pyomo_fesd.mpcc.compile.arrival_indices import arrival_indices, both_positions, moves, positions_of
 from pyomo_fesd.mpcc.compile.casadi_matrices import csr
-from pyomo_fesd.mpcc.compile.model_values import ModelValues, start_values, stated_bounds
-from pyomo_fesd.mpcc.compile.mpcc_functions import (
+from pyomo_fesd.mpcc.compile.hint_indices import (
     ChangeIndices,
     CoincidenceIndices,
     FillingIndices,
     FollowerIndices,
-    MpccData,
-    MpccFunctions,
     NeighbourIndices,
 )
+from pyomo_fesd.mpcc.compile.model_values import ModelValues, start_values, stated_bounds
+from pyomo_fesd.mpcc.compile.mpcc_functions import MpccData, MpccFunctions
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.parameters import parameter_values
 from pyomo_fesd.mpcc.compile.round_off import EXACT

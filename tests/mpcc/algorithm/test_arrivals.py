@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pyomo_fesd.mpcc.algorithm.arrivals import branches
-from pyomo_fesd.mpcc.compile.mpcc_functions import ArrivalIndices, MoveIndices, OptionIndices, PlaceIndices, ToggleIndices
+from pyomo_fesd.mpcc.compile.hint_indices import ArrivalIndices, MoveIndices, OptionIndices, PlaceIndices, ToggleIndices
 from pyomo_fesd.mpcc.subproblems import G_ZERO, H_ZERO, ActiveSets
 
 NONE = np.zeros(0, dtype=int)

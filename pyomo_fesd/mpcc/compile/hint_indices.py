@@ -1,0 +1,133 @@
+"""Records of ``HomotopyHints`` by positions of pairs and variables, as the algorithm reads them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class NeighbourIndices:
+    """A ``NeighbourBranch`` by positions of pairs and variables.
+
+    Attributes
+    ----------
+    targets, sources : int arrays, pairs; the first get the zero sides of the second
+    ended : int array, pairs whose first side becomes zero
+    short : int array
+        variables; unless one of them is at its lower bound the branch is not tried (none: always)
+    starts : int array, variables that start elsewhere
+    at : array, their start values
+    """
+
+    targets: np.ndarray
+    sources: np.ndarray
+    ended: np.ndarray
+    short: np.ndarray
+    starts: np.ndarray
+    at: np.ndarray
+
+
+@dataclass(frozen=True)
+class MoveIndices:
+    """Pairs that change if a change moves; ``targets`` get the zero sides of ``sources``, the first side of ``ended`` becomes 0."""
+
+    targets: np.ndarray
+    sources: np.ndarray
+    ended: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ChangeIndices:
+    """A ``Change`` by positions of pairs.
+
+    Attributes
+    ----------
+    pairs, partners : int arrays
+    later, earlier : MoveIndices
+    """
+
+    pairs: np.ndarray
+    partners: np.ndarray
+    later: MoveIndices
+    earlier: MoveIndices
+
+
+@dataclass(frozen=True)
+class CoincidenceIndices:
+    """A ``Coincidence`` by positions of pairs and variables (None: there is no such place)."""
+
+    changes: tuple
+    later: int | None
+    earlier: int | None
+    fixed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceIndices:
+    """A ``Place`` by positions; ``extent`` is None where it is given."""
+
+    extent: int | None
+    inside: MoveIndices
+    between: MoveIndices
+
+
+@dataclass(frozen=True, eq=False)
+class ToggleIndices:
+    """A ``Toggle`` by positions of pairs and gauges; ``first`` and ``second`` may be None; ``swapped`` belongs to ``with_them``."""
+
+    pairs: np.ndarray
+    first: int | None
+    second: int | None
+    with_them: np.ndarray
+    swapped: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class OptionIndices:
+    """An ``Option`` by positions: gauges, pairs with the side that is required, pairs with the side they get, open pairs."""
+
+    gauges: np.ndarray
+    required: np.ndarray
+    required_sides: np.ndarray
+    pairs: np.ndarray
+    sides: np.ndarray
+    either: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ArrivalIndices:
+    """An ``Arrival`` by positions; arrivals at one end share their ``rows``, one or two tuples of PlaceIndices."""
+
+    rows: tuple
+    toggles: tuple
+    options: tuple
+
+
+@dataclass(frozen=True)
+class FollowerIndices:
+    """All ``Follower`` by positions of pairs.
+
+    Attributes
+    ----------
+    pairs, leaders : int arrays
+    swapped : bool array
+    """
+
+    pairs: np.ndarray
+    leaders: np.ndarray
+    swapped: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class FillingIndices:
+    """A ``Filling`` by positions of pairs and variables; ``coefficients`` are those of the scaled variables ``extents``.
+
+    ``scales`` are the factors of the variables ``shares``.
+    """
+
+    pairs: np.ndarray
+    shares: np.ndarray
+    scales: np.ndarray
+    extents: np.ndarray
+    coefficients: np.ndarray
+    amount: float
