@@ -6,7 +6,7 @@ decisions, terms as rows), ``nonlinear_parts`` (their canonical form), ``round_o
 ``model_rows`` (all of it), ``grouped_rows`` (classes of equal form), ``row_classes`` with ``elementwise`` and ``row_functions``
 (values and derivatives), ``scaling``, ``sizes`` and ``natural_units`` (factors from the model's own numbers), ``assemble``,
 ``hint_indices`` with ``arrival_indices`` (hints by positions), ``scaled_functions``, ``model_values`` (bounds and starts),
-``mpcc_functions`` (the result), ``derivatives`` (chain rule for all NLPs), ``staleness`` (changes of the model after it was compiled),
+``mpcc_functions`` (the result), ``derivatives`` (chain rule for all NLPs), ``staleness`` (changes of the model after compiling),
 ``nl_file`` (a file to keep).
 """
 
