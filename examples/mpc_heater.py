@@ -15,6 +15,12 @@ switches at times that the plan did not have. ::
     min  int price q + w (y - 55)^2 + r v^2 dt
 
 Time in hours, temperature in degrees Celsius, power in kW.
+
+**Why the answer is right.** Temperature and set point of the plant come from a
+simulation with the water that was really drawn, and the relay obeys its law: power
+changes only where the temperature meets an edge of the grey band. The plans are
+certified local optima of a problem with many of them, so the loop is not the best
+possible: with a smoothed heater in the model it is cheaper (see the benchmarks).
 """
 
 import random

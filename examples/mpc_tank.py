@@ -16,6 +16,15 @@ itself: every switch of it is an element boundary. ::
     M_G R T/P + M_L/rho_L = V,    min  int w_P (P - P_ref)^2 + w_u (u - u_ref)^2 dt
 
 Plant: gas_liquid_tank.py, after the paper, eq. (22) and (23).
+
+**Why the answer is right.** The plant is simulated, not assumed: each interval is a
+solution of its own, with its own valve and feeds, and every switch is an element
+boundary. The loop has an answer at every step, most of them certified as local optima
+of the plan. That a plan is no poor local optimum is checked by simulations with held
+valves (``levels``), without which the loop follows one (see the benchmarks). The
+picture obeys the modes: while the level is above the outlet no gas leaves, so the
+pressure rises whatever the valve does; where the level slides, the valve holds the
+reference.
 """
 
 import random

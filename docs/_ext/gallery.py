@@ -53,7 +53,7 @@ SECONDS = {
     'idaes_relief': 16,
     'idaes_boiling': 14,
     'idaes_startup': 36,
-    'idaes_mpc': 200,
+    'idaes_mpc': 100,
 }
 CODE = '.. code-block:: Python\n'
 

@@ -23,9 +23,11 @@ from matplotlib.figure import Figure
 HERE = Path(__file__).parent
 #: Seconds for one loop.
 LIMIT = 5400
-#: Lines of the other methods.
-COLORS = {'pyomo_fesd, levels=5': 'C8', 'pyomo_fesd, rise=0.1': 'C7', 'smoothed on a fixed grid': '0.7', 'nosnoc 0.2.0': 'k'}
-COLORS |= {'pyomo_fesd' + ADVANCED: 'C6', 'pyomo_fesd, levels=5' + ADVANCED: 'C6'}
+#: Lines of the methods; the time of each step of the first one is a point.
+COLORS = {'pyomo_fesd': 'k', 'pyomo_fesd, levels=5': 'C8', 'pyomo_fesd, rise=0.1': 'C6', 'nosnoc 0.2.0': 'C9'}
+COLORS |= {'smoothed on a fixed grid': '0.7', 'pyomo_fesd' + ADVANCED: 'C5', 'pyomo_fesd, levels=5' + ADVANCED: 'C5'}
+#: Costs of loops that differ by more than this factor have a logarithmic axis.
+WIDE = 5.0
 #: Steps that all loops have made.
 COMMON = 25
 ORIGINS = ('correction', 'branch', 'simulated branch', 'full run', 'deadline', 'plan')
@@ -62,22 +64,24 @@ def draw():
     """Time of each step by its origin, and the cost of each loop so far."""
     tables = {(plant, method): pd.read_csv(file_of(plant, method)) for plant, method in METHODS if file_of(plant, method).exists()}
     plants = list(dict.fromkeys(plant for plant, _ in tables))
-    figure = Figure(figsize=(4 * len(plants), 6), layout='constrained')
+    figure = Figure(figsize=(4 * len(plants), 7), layout='constrained')
     axes = figure.subplots(2, len(plants), squeeze=False)
+    shown = {}
     for column, plant in zip(axes.T, plants):
         times, costs = column
-        for (_, method), table in ((key, t) for key, t in tables.items() if key[0] == plant):
-            if method == 'pyomo_fesd':
-                for number, origin in enumerate(ORIGINS):
-                    some = table[table['origin'] == origin]
-                    times.semilogy(some.index, some['seconds'], '.', color=f'C{number}', label=origin)
-            else:
-                times.semilogy(table.index, table['seconds'], linewidth=0.6, color=COLORS[method], label=method)
-            costs.plot(table['cost'].cumsum(), label=method)
+        ours = {method: table for (p, method), table in tables.items() if p == plant}
+        for method, table in ours.items():
+            (shown[method],) = costs.plot(table['cost'].cumsum(), color=COLORS[method], linewidth=1.2)
+            if method != 'pyomo_fesd':
+                times.semilogy(table.index, table['seconds'], linewidth=0.6, color=COLORS[method])
+        for number, origin in enumerate(ORIGINS[1:]):
+            some = ours['pyomo_fesd'][ours['pyomo_fesd']['origin'] == origin]
+            (shown[f'pyomo_fesd: {origin}'],) = times.semilogy(some.index, some['seconds'], '.', markersize=4, color=f'C{number}')
+        whole = [table['cost'].sum() for table in ours.values() if len(table) > COMMON]
+        costs.set_yscale('log' if max(whole) > WIDE * min(whole) else 'linear')
         times.set(title=plant, ylabel='time of a step (s)')
         costs.set(xlabel='step', ylabel='cost of the loop so far')
-        times.legend(fontsize=6, framealpha=0.5)
-        costs.legend(fontsize=7)
+    figure.legend(shown.values(), shown.keys(), loc='outside lower center', ncols=4, fontsize=8)
     figure.savefig(HERE / 'summary.png', dpi=150)
 
 
