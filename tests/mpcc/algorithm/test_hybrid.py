@@ -12,6 +12,7 @@ from pyomo.mpec import Complementarity, complements
 from scipy.optimize import linprog
 
 import pyomo_fesd
+from pyomo_fesd.mpcc.algorithm.branches import Branches
 
 SOLVER = 'mpec_hybrid'
 
@@ -146,3 +147,13 @@ def test_a_hopeless_small_problem_ends_soon(product):
     assert results.solver.termination_condition == pyo.TerminationCondition.infeasible
     assert results.solver.nlps <= (60 if product else 25)
     assert results.solver.violated
+
+
+def test_a_warm_start_that_ends_uncertified_is_followed_by_the_homotopy(monkeypatch):
+    monkeypatch.setattr(Branches, '_descend', lambda self, point, worth: None)
+    model, best = small_mpccs.toy(0.0, 0.0)
+    steps = solve(model, warm_start=True).solver.steps
+    kinds = [step.kind for step in steps]
+    # the branch of the origin is not certified, and nothing descends from it
+    assert kinds[:2] == ['branch', 'certificate'] and 'relaxation' in kinds
+    assert pyo.value(model.f) == pytest.approx(best, abs=1e-7)
