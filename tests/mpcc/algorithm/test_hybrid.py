@@ -151,9 +151,9 @@ def test_a_hopeless_small_problem_ends_soon(product):
 
 def test_a_warm_start_that_ends_uncertified_is_followed_by_the_homotopy(monkeypatch):
     monkeypatch.setattr(Branches, '_descend', lambda self, point, worth: None)
-    model, best = small_mpccs.toy(0.0, 0.0)
-    steps = solve(model, warm_start=True).solver.steps
-    kinds = [step.kind for step in steps]
-    # the branch of the origin is not certified, and nothing descends from it
+    model = small_mpccs.pair(0.5, 0.0)
+    model.f = pyo.Objective(expr=(model.x + 1) ** 2 + (model.y - 1) ** 2)
+    kinds = [step.kind for step in solve(model, warm_start=True).solver.steps]
+    # the branch y = 0 ends at the origin, and nothing is tried from there
     assert kinds[:2] == ['branch', 'certificate'] and 'relaxation' in kinds
-    assert pyo.value(model.f) == pytest.approx(best, abs=1e-7)
+    assert (model.x.value, model.y.value) == pytest.approx((0, 1), abs=1e-7)
