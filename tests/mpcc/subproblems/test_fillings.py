@@ -66,11 +66,11 @@ def test_a_filling_without_all_of_its_variables_is_no_hint():
 
 def test_a_descent_that_goes_on_beyond_a_near_place_is_not_overlooked():
     m = places()
-    m.z = pyo.Var(initialize=1.49998)
+    m.z = pyo.Var(initialize=1.499995)
     m.tied = pyo.Constraint(expr=m.z == m.r[1])
-    # two terms cancel: the slope is 1e-4 of them, and 2e-5 before the next place is empty the descent is within tolerance
-    m.o.set_value(0.9999 * m.z - m.r[1])
-    for n, (extent, share) in enumerate(zip((1.49998, 0.8, 0.70002), (1.0, 2.5e-5, 0.0)), start=1):
+    # two terms cancel: the slope is 1e-3 of them, and 5e-6 before the next place is empty the descent is within tolerance
+    m.o.set_value(0.999 * m.z - m.r[1])
+    for n, (extent, share) in enumerate(zip((1.499995, 0.8, 0.700005), (1.0, 6.25e-6, 0.0)), start=1):
         m.r[n].value, m.s[n].value = extent, share
     assert not certify(m).certified
     solver = pyo.SolverFactory('mpec_hybrid')
