@@ -26,7 +26,7 @@ import pyomo_fesd
 HERE = Path(__file__).parent
 NOISE, NFE, SAMPLES, SEED = 0.01, 12, 200, 1
 #: Samples at whose own solution ``covariance`` is called as well.
-OWN = 25
+OWN = 30
 #: Switching times of the experiments, estimates as well.
 TIMES = ('t_1', 't_2')
 NAMES = (*TRUTH, *TIMES)
