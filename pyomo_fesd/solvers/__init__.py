@@ -2,7 +2,7 @@
 
 Read in this order: ``mpec_hybrid`` (puts the parts of ``pyomo_fesd.mpcc`` together) with ``options`` (one row each),
 ``persistent_model`` (``set_instance``: compiled once, solved many times) and ``unready_models`` (models that are refused),
-``simulated_start`` (a simulation where nothing is free), ``user_names`` (of what is violated),
+``simulated_start`` (a simulation where nothing is free), ``even_elements`` (of a solution), ``user_names`` (of what is violated),
 ``casadi_ipopt`` (plain NLPs) with ``singular_start`` and ``stand_in`` (for the names of an executable), ``plugin`` (code of both).
 Here, and not in ``mpcc``, solvers know of time: indicators of disjuncts, diagnostics, models that are not discretised.
 """

@@ -3,7 +3,7 @@
     .venv/bin/pip install distributed
     .venv/bin/python docs/benchmarks/sweep/run.py               everything but the following two
     .venv/bin/python docs/benchmarks/sweep/run.py --scaling     needs a machine on which nothing else runs, and two minutes there
-    .venv/bin/python docs/benchmarks/sweep/run.py --review      warnings of the first 200 scenarios and of those that disagree
+    .venv/bin/python docs/benchmarks/sweep/run.py --review      warnings of the first 30 scenarios and of those that disagree
 
 Writes rows.csv (the scenarios, with the errors against scipy), disagreements.csv, runs.csv (kill and resume) and summary.png;
 scaling.csv and scaling.png; review.csv and review_summary.csv, beside this file.  The sweeps of several processes run in processes
@@ -37,7 +37,7 @@ import pyomo_fesd
 
 HERE = Path(__file__).parent
 PROCESSES, KILLED_AT = 2, 400
-SCALING_NUMBER, REVIEWED = 40, 200
+SCALING_NUMBER, REVIEWED = 40, 30
 ERRORS = {f'error of {name}': name for name in OUTPUTS}
 COLUMNS = ['scenario', *RANGES, 'outcome', 'certified', 'reason', 'warnings', 'seconds', *OUTPUTS, *ERRORS]
 #: Words of the message on a crossing that the elements do not detect.

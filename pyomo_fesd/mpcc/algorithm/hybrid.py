@@ -97,8 +97,7 @@ class HybridSolver:
         if not certified and self._options.warm_start == ONLY:
             return Outcome.NO_BRANCH if self.run.point is None else Outcome.FEASIBLE
         if not certified:
-            self._complete()
-            if self.run.point is None:
+            if not self._complete():
                 self._follow_path()
             if self.run.point is not None and self._c.has_objective:
                 self._branches.try_neighbours()
@@ -123,9 +122,14 @@ class HybridSolver:
                 return
 
     def _complete(self):
-        """Rounds of relaxation, completion and branch, where points can be completed and something is to be minimised."""
-        if self._completions is not None:
-            self._completions.follow(self._c.x0)
+        """Rounds of relaxation, completion and branch, where points can be completed and something is to be minimised.
+
+        Returns whether there were any, and there is a feasible point.
+        """
+        if self._completions is None:
+            return False
+        self._completions.follow(self._c.x0)
+        return self.run.point is not None
 
     def _follow_path(self):
         """The homotopy from the start; where it finds no feasible point, from a further start."""

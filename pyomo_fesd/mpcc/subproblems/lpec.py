@@ -26,6 +26,8 @@ from pyomo_fesd.mpcc.subproblems.descent import Descent
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, refusal, solve
 from pyomo_fesd.mpcc.subproblems.side_constraints import release_followers, without_constant
 
+#: A relative descent beyond positive sides of fillings counts from here: those of two places differ by the error of a method.
+BEYOND_FILLINGS = 1e-4
 #: Displacements, relative to the variables' sizes, along which gradients are compared; so many, in random directions.
 DISPLACEMENT, DISPLACEMENTS, SEED = 1e-4, 2, 0
 
@@ -106,7 +108,7 @@ class Lpec:
         if enough is None or not self._c.fillings or not found.solved or found.descent > enough:
             return found
         further = self._solve(w, sets, Delta, equal, beyond, multipliers, enough, limits, released=True)
-        return further if further.descent > enough else found
+        return further if further.descent > max(enough, BEYOND_FILLINGS) else found
 
     def _solve(self, w, sets, Delta, equal, beyond, multipliers, enough, limits, released):
         """``solve``, with the positive sides of fillings, or where they are ``released`` without."""

@@ -12,6 +12,7 @@ from pyomo.mpec import Complementarity, complements
 from scipy.optimize import linprog
 
 import pyomo_fesd
+from pyomo_fesd.mpcc.algorithm.branches import Branches
 
 SOLVER = 'mpec_hybrid'
 
@@ -146,3 +147,13 @@ def test_a_hopeless_small_problem_ends_soon(product):
     assert results.solver.termination_condition == pyo.TerminationCondition.infeasible
     assert results.solver.nlps <= (60 if product else 25)
     assert results.solver.violated
+
+
+def test_a_warm_start_that_ends_uncertified_is_followed_by_the_homotopy(monkeypatch):
+    monkeypatch.setattr(Branches, '_descend', lambda self, point, worth: None)
+    model = small_mpccs.pair(0.5, 0.0)
+    model.f = pyo.Objective(expr=(model.x + 1) ** 2 + (model.y - 1) ** 2)
+    kinds = [step.kind for step in solve(model, warm_start=True).solver.steps]
+    # the branch y = 0 ends at the origin, and nothing is tried from there
+    assert kinds[:2] == ['branch', 'certificate'] and 'relaxation' in kinds
+    assert (model.x.value, model.y.value) == pytest.approx((0, 1), abs=1e-7)

@@ -6,6 +6,7 @@ import pytest
 from pyomo.common.timing import HierarchicalTimer
 from pyomo.mpec import Complementarity, complements
 
+from pyomo_fesd import certify
 from pyomo_fesd.core import Filling, homotopy_hints
 from pyomo_fesd.mpcc.compile import compile_mpcc, read_mpcc
 from pyomo_fesd.mpcc.subproblems import FREE, G_ZERO, H_ZERO, settle, sort_sides
@@ -61,3 +62,17 @@ def test_a_filling_without_all_of_its_variables_is_no_hint():
     m = places()
     m.r[2].fix(1.0)
     assert compile_mpcc(read_mpcc(m), HierarchicalTimer()).fillings == []
+
+
+def test_a_descent_that_goes_on_beyond_a_near_place_is_not_overlooked():
+    m = places()
+    m.z = pyo.Var(initialize=1.499995)
+    m.tied = pyo.Constraint(expr=m.z == m.r[1])
+    # two terms cancel: the slope is 1e-3 of them, and 5e-6 before the next place is empty the descent is within tolerance
+    m.o.set_value(0.999 * m.z - m.r[1])
+    for n, (extent, share) in enumerate(zip((1.499995, 0.8, 0.700005), (1.0, 6.25e-6, 0.0)), start=1):
+        m.r[n].value, m.s[n].value = extent, share
+    assert not certify(m).certified
+    solver = pyo.SolverFactory('mpec_hybrid')
+    assert solver.solve(m, warm_start=True).solver.stationarity == 'B'
+    assert m.r[1].value == pytest.approx(3 - 2e-3, abs=1e-6) and m.s[1].value == pytest.approx(AMOUNT / m.r[1].value, abs=1e-6)
