@@ -211,7 +211,7 @@ class _Run:
             settled = size < 1e-12 or (fresh and size < 1e-8 and size > 0.3 * previous)
             if damping == 1 and (exact or algebra < 1e-7) and settled:
                 return w
-            if damping < 1 or size > CONTRACTION * previous:
+            if damping < 1 or previous == np.inf or size > CONTRACTION * previous:
                 solve = None
             previous = size
         raise NoStep
@@ -251,8 +251,6 @@ def _factors(matrix):
         raise Failure(f"{matrix.shape[0]} equations for {matrix.shape[1]} unknowns")
     row, column, dense = np.ones(matrix.shape[0]), np.ones(matrix.shape[0]), isinstance(matrix, np.ndarray)
     size = abs(matrix)
-    if not np.isfinite(size.max()):
-        raise NoStep
     for _ in range(2):
         row = 1 / _positive(_largest(size @ _diagonal(column, dense), 1))
         column = 1 / _positive(_largest(_diagonal(row, dense) @ size, 0))
