@@ -212,7 +212,7 @@ def yielding_demand(m):
 TESTS = 'models/unit_models/tests/'
 CASES = {
     'CSTR': Case(TESTS + 'test_cstr.py: TestSaponification', cstr, cooler, flowsheet_time, (10, 20)),
-    'plug flow': Case(TESTS + 'test_pfr.py: TestSaponification', plug_flow, more_feed, flowsheet_time, (10,)),
+    'plug flow': Case(TESTS + 'test_pfr.py: TestSaponification', plug_flow, more_feed, flowsheet_time, (10, 20)),
     'heater': Case(TESTS + 'test_heater.py: TestSaponification', heater, less_heat, flowsheet_time, (10,)),
     'two-phase heater': Case(TESTS + 'test_heater.py: TestBT_Generic', boiling_heater, more_heat, flowsheet_time, (10,)),
     'heat exchanger 1D': Case(
@@ -226,7 +226,7 @@ CASES = {
         pipeline,
         yielding_demand,
         flowsheet_time,
-        (20, 40),
+        (20,),
         reference={'begin': (1, 10)},
     ),
 }

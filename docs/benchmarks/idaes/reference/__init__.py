@@ -1,6 +1,6 @@
 """An event-located reference for a flowsheet with Disjunctions over time, which uses nothing of pyomo_fesd.
 
-``equations`` reads the equations of one time from the model before any transformation, by Pyomo's flattening and its NL file;
+``equations`` reads the equations of one time from the model before any transformation, by their indices and Pyomo's NL file;
 ``radau`` integrates them by steps of Radau's scheme (order 5) of controlled length and ends a step where a mode ends.
 """
 

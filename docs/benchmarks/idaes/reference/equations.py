@@ -11,7 +11,6 @@ import pyomo.environ as pyo
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import DerivativeVar
-from pyomo.dae.flatten import flatten_dae_components
 from pyomo.gdp import Disjunction
 from pyomo.repn.plugins.nl_writer import NLWriter
 
@@ -41,12 +40,10 @@ class Equations:
     """
 
     def __init__(self, m, time, label, start=None):
-        _, variables = flatten_dae_components(m, time, pyo.Var)
-        _, constraints = flatten_dae_components(m, time, pyo.Constraint, active=True)
-        families = ComponentMap((family[label], family) for family in variables if label in family)
-        of_time = _discretisation(m, time)
-        data = [c[label] for c in constraints if label in c]
-        common = [c.body - c.upper for c in data if c.active and c.equality and c.parent_component() not in of_time]
+        families = ComponentMap((family[label], family) for family in _families(m, time) if label in family)
+        of_time, split = _discretisation(m, time), _Split(time)
+        data = [c for c in m.component_data_objects(pyo.Constraint, active=True) if split(c)[0] == label]
+        common = [c.body - c.upper for c in data if c.equality and c.parent_component() not in of_time]
         rows = self._numbered(common, [[_rows(d) for d in found.disjuncts] for found in _disjunctions(m, time, label)])
         pairs = [(x, rate) for x, rate in _derivatives(m, time, label) if x in families and not _is_input(families[x])]
         given = [x for x, _ in pairs if x.fixed]
@@ -107,6 +104,51 @@ def _is_input(family):
     return all(v.fixed for v in family.values())
 
 
+class _Split:
+    """The time in the index of data, or of a block around them, and a key of the rest; faster than Pyomo's flattening."""
+
+    def __init__(self, time):
+        self._time, self._places = time, {}
+
+    def __call__(self, data):
+        label, key = None, []
+        while data is not None:
+            component = data.parent_component()
+            index = data.index() if component.is_indexed() else ()
+            index = index if isinstance(index, tuple) else (index,)
+            place = self._place(component)
+            if place is not None:
+                label, index = index[place], (*index[:place], *index[place + 1 :])
+            key.append((id(component), index))
+            data = data.parent_block()
+        return label, tuple(key)
+
+    def _place(self, component):
+        if id(component) not in self._places:
+            self._places[id(component)] = _place_of(component, self._time) if component.is_indexed() else None
+        return self._places[id(component)]
+
+
+def _place_of(component, time):
+    """The position of the time in the index of a component; None without."""
+    position = 0
+    for subset in component.index_set().subsets(expand_all_set_operators=False):
+        if subset is time:
+            return position
+        position += subset.dimen or 1
+    return None
+
+
+def _families(m, time):
+    """Variables over time as dicts by label."""
+    split, found = _Split(time), {}
+    for v in m.component_data_objects(pyo.Var):
+        label, key = split(v)
+        if label is not None:
+            found.setdefault(key, {})[label] = v
+    return found.values()
+
+
 def _time_derivatives(m, time):
     for derivative in m.component_objects(pyo.Var):  # pyomo.dae makes Vars of them
         if isinstance(derivative, DerivativeVar) and any(s is time for s in derivative.get_continuousset_list()):
@@ -125,13 +167,9 @@ def _discretisation(m, time):
 
 def _at_label(component, time, label):
     """(index, data) of an indexed component at a time."""
-    subsets, position = list(component.index_set().subsets(expand_all_set_operators=False)), 0
-    for subset in subsets:
-        if subset is time:
-            break
-        position += subset.dimen or 1
+    place = _place_of(component, time)
     for index, data in component.items():
-        if (index if len(subsets) == 1 else index[position]) == label:
+        if (index[place] if isinstance(index, tuple) else index) == label:
             yield index, data
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import lapack
 from scipy.optimize import brentq
 from scipy.sparse.linalg import splu
 
@@ -19,6 +20,8 @@ A = np.array(
 ORDER, NEWTON_STEPS = 5, 25
 #: Largest residual of a solution relative to the terms of its row: round-off.
 EXACT = 1e-13
+#: The matrix of Newton's method stays as long as a change is below this part of the one before.
+CONTRACTION = 0.05
 #: Unknowns of a step up to which a dense factorisation is faster.
 DENSE = 200
 
@@ -149,6 +152,7 @@ class _Run:
         length = 1e-9 * h if least(0) <= 0 else brentq(least, 0, h, xtol=1e-14 * self.horizon, rtol=1e-14)
         w = self._step(x, length, w, mode)
         x, t = w[2][self.eq.states], t + length
+        self.size = np.maximum(self.size, np.abs(x))
         others = [other for other in self.eq.modes if other != mode]
         after, w = self._follow(x, min(h, 1e-4 * self.horizon), w, others, mode)
         path.switches.append((t, mode, after))
@@ -185,22 +189,30 @@ class _Run:
         eq, n = self.eq, len(self.eq.names)
         w = guess.copy()
         w[:, eq.states] = x + h * A @ w[:, eq.rates]
-        previous = np.inf
+        previous, solve = np.inf, None
         for _ in range(NEWTON_STEPS):
-            residual, matrix = self._system(w, x, h, mode)
+            fresh = solve is None
+            if fresh:
+                residual, matrix = self._system(w, x, h, mode)
+                solve, matrix = _factors(matrix), abs(matrix)
+            else:
+                residual = self._residual(w, x, h, mode)
             if not np.isfinite(residual).all():
                 raise NoStep
             # at rest rates consist of round-off, and their changes are as large: no row says more then
-            exact = (np.abs(residual) <= EXACT * (abs(matrix) @ np.abs(w.ravel()))).all()
-            change = _solve(matrix, residual).reshape(3, n)
+            exact = (np.abs(residual) <= EXACT * (matrix @ np.abs(w.ravel()))).all()
+            change = solve(residual).reshape(3, n)
             damping = 1.0
             while damping > 1e-3 and not np.isfinite(self._residual(w - damping * change, x, h, mode)).all():
                 damping /= 2
             w = w - damping * change
             size = self._size_of(w, change, h)
             algebra = (np.abs(change).max(axis=0) / (np.abs(w).max(axis=0) + 1e-9 * np.abs(w).max())).max()
-            if damping == 1 and (exact or algebra < 1e-7) and (size < 1e-12 or (size < 1e-8 and size > 0.3 * previous)):
+            settled = size < 1e-12 or (fresh and size < 1e-8 and size > 0.3 * previous)
+            if damping == 1 and (exact or algebra < 1e-7) and settled:
                 return w
+            if damping < 1 or previous == np.inf or size > CONTRACTION * previous:
+                solve = None
             previous = size
         raise NoStep
 
@@ -233,19 +245,31 @@ class _Run:
         return self._residual(w, x, h, mode), matrix
 
 
-def _solve(matrix, rhs):
-    """Solve with rows and columns brought to size one, twice in turn."""
+def _factors(matrix):
+    """A function that solves with a matrix; rows and columns are brought to size one, twice in turn."""
     if matrix.shape[0] != matrix.shape[1]:
         raise Failure(f"{matrix.shape[0]} equations for {matrix.shape[1]} unknowns")
-    row, column, dense = np.ones(len(rhs)), np.ones(len(rhs)), isinstance(matrix, np.ndarray)
+    row, column, dense = np.ones(matrix.shape[0]), np.ones(matrix.shape[0]), isinstance(matrix, np.ndarray)
     size = abs(matrix)
     for _ in range(2):
         row = 1 / _positive(_largest(size @ _diagonal(column, dense), 1))
         column = 1 / _positive(_largest(_diagonal(row, dense) @ size, 0))
     scaled = _diagonal(row, dense) @ matrix @ _diagonal(column, dense)
+    solve = _dense_factors(scaled) if dense else _sparse_factors(scaled)
+    return lambda rhs: column * solve(row * rhs)
+
+
+def _dense_factors(matrix):
+    factors, pivots, info = lapack.dgetrf(matrix)
+    if info:
+        raise NoStep
+    return lambda rhs: lapack.dgetrs(factors, pivots, rhs)[0]
+
+
+def _sparse_factors(matrix):
     try:
-        return column * (np.linalg.solve(scaled, row * rhs) if dense else splu(scaled.tocsc()).solve(row * rhs))
-    except (RuntimeError, np.linalg.LinAlgError) as error:
+        return splu(matrix.tocsc()).solve
+    except RuntimeError as error:
         raise NoStep from error
 
 
