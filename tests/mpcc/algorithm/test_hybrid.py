@@ -150,7 +150,7 @@ def test_a_hopeless_small_problem_ends_soon(product):
 
 
 def test_a_warm_start_that_ends_uncertified_is_followed_by_the_homotopy(monkeypatch):
-    monkeypatch.setattr(Branches, '_descend', lambda self, point, worth: None)
+    monkeypatch.setattr(Branches, 'descend', lambda self, point, worth: None)
     model = small_mpccs.pair(0.5, 0.0)
     model.f = pyo.Objective(expr=(model.x + 1) ** 2 + (model.y - 1) ** 2)
     kinds = [step.kind for step in solve(model, warm_start=True).solver.steps]
