@@ -181,7 +181,7 @@ def draw_scaling(found):
     axis = figure.subplots()
     bars = axis.bar([f'{kind}, {processes}' for kind, processes in zip(found['executor'], found['processes'])], found['seconds'])
     axis.bar_label(bars, [f'{row["times as fast"]:.2f} x\nload {row["load"]:.1f}' for _, row in found.iterrows()])
-    axis.set_xlabel('executor, processes; above: times as fast as one process, load before')
+    axis.set_xlabel('executor, processes (above: times as fast, load)')
     axis.set_ylabel(f'seconds of {found["scenarios"][0]} scenarios')
     axis.margins(y=0.2)
     return figure
