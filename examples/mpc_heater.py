@@ -162,7 +162,7 @@ def draw(real, steps):
     warm.fill_between(table.index, low, high, color='0.88', label='band of the relay')
     warm.plot(table['y'], label='water')
     warm.set_ylabel('temperature (°C)')
-    warm.legend()
+    warm.legend(loc='lower right', bbox_to_anchor=(1, 1), ncols=2, frameon=False)
     power.plot(table['q'], drawstyle='steps-pre', color='C3')
     power.set_ylabel('heater (kW)')
     prices = power.twinx()
