@@ -59,7 +59,7 @@ OPTIONS = (
         'auto',
         In(['auto', 'reduced', 'full']),
         "'reduced': binaries for bi-active pairs only; 'full': also an LPEC with a binary for every pair that searches for a "
-        "better branch within the trust region after each certificate; 'auto': full for up to 50 pairs",
+        "better branch within the trust region after each certificate, with at most 100 nodes; 'auto': full for up to 50 pairs",
     ),
     (
         'warm_start',
