@@ -9,6 +9,7 @@ from pyomo_fesd.diagnostics.collapsed_elements import collapsed_elements
 from pyomo_fesd.diagnostics.missed_crossings import missed_crossings
 from pyomo_fesd.diagnostics.uneven_elements import uneven_elements
 from pyomo_fesd.diagnostics.uniqueness import not_unique
+from pyomo_fesd.diagnostics.unknown_first_modes import unknown_first_modes
 from pyomo_fesd.diagnostics.varied_inputs import varied_inputs
 from pyomo_fesd.results import switching_functions
 
@@ -17,6 +18,7 @@ logger = logging.getLogger('pyomo_fesd')
 #: Functions ``(model, wrt, switching functions)`` that yield messages, by what they look for.
 CHECKS = {
     'uniqueness': not_unique,
+    'first modes': unknown_first_modes,
     'missed crossings': missed_crossings,
     'collapsed elements': collapsed_elements,
     'uneven elements': uneven_elements,

@@ -72,6 +72,10 @@ class ActiveSetStepper:
         """Values on the left of which none is known."""
         return np.full(self._f.functions.shape[0], np.nan)
 
+    def values_on_left(self, w: np.ndarray) -> np.ndarray:
+        """Return the values of all functions where every point has the values ``w`` of the left boundary; nan where they jump."""
+        return np.where(self._f.continuous, self._f.evaluate(w)[0][self._f.functions[:, 0]], np.nan)
+
     @property
     def names(self) -> list[str]:
         """The conditions of an active set."""

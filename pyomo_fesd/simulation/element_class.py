@@ -33,6 +33,8 @@ class ElementEnd:
     element_class : ElementClass
     activity : bytes
         for each condition whether its G (else its H) is positive in the element, as in eq. (12)
+    is_first : bool
+        whether it is the first time, the end of no element
     """
 
     active: dict[str, bool] | None = None
@@ -40,6 +42,20 @@ class ElementEnd:
     values: np.ndarray | None = None
     element_class: ElementClass | None = None
     activity: bytes | None = None
+    is_first: bool = False
+
+
+@dataclass(frozen=True)
+class LeftBoundary:
+    """Values that the variables of an element have at its left boundary.
+
+    Attributes
+    ----------
+    unknown, known : list
+    """
+
+    unknown: list
+    known: list
 
 
 class ElementClass:
@@ -81,25 +97,35 @@ class ElementClass:
         return step is not None
 
     def newton_step(
-        self, equations: ElementEquations, before: ElementEnd, most: float, start: Callable[[], list]
+        self, equations: ElementEquations, before: ElementEnd, most: float, at_left: Callable[[], LeftBoundary]
     ) -> tuple[float, ElementEnd] | None:
         """Solve an element of at most the length ``most`` that goes on with the active set of ``before``.
 
         Conditions that ``before`` does not have, such as those that a model states after the first time only, are guessed from the
-        values at the left boundary.  Returns (length, ElementEnd), or None if the active set is unknown or does not hold; ``start``
-        returns values of the unknowns for the first element of the class.
+        values at the left boundary.  Returns (length, ElementEnd), or None if the active set is unknown or does not hold;
+        ``at_left`` is called for the first element of the class.
         """
         if before.active is None or self._stepper is None:
             return None
         names = self._stepper.names
         goes_on = before.active.keys() >= set(names)
-        values = self._values if goes_on and self._values is not None else start()
+        values = self._values if goes_on and self._values is not None else at_left().unknown
         guess = {} if goes_on else self._guess(equations, values)
         active = np.array([before.active.get(name, guess.get(name)) for name in names], dtype=bool)
         event = None if before.event is None or before.event[0] not in names else 2 * names.index(before.event[0]) + before.event[1]
-        left = before.values if before.element_class is self and before.values is not None else self._stepper.unknown_values
         with phase(self._timer, 'newton'):
+            left = self._functions_on_left(before, goes_on, at_left)
             return self._newton(equations, active, left, most, values, event)
+
+    def _functions_on_left(self, before, goes_on, at_left):
+        """Values of all functions at the left boundary; nan where they are unknown."""
+        if before.element_class is self and before.values is not None:
+            return before.values
+        if not (before.is_first and goes_on):
+            return self._stepper.unknown_values
+        left = at_left()
+        self._residuals.set_known(left.known)
+        return self._stepper.values_on_left(self._residuals.point(left.unknown))
 
     def _guess(self, equations, values):
         """For each condition whether its H (else its G) is the smaller side at some values."""

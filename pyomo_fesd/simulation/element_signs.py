@@ -30,7 +30,7 @@ class ElementSigns:
     def __init__(self, residuals: ElementResiduals, tau: tuple[float, ...]):
         self._f, self._tau = residuals, np.array(tau)
         self._nodes = np.array([*tau, *([] if tau[-1] == 1 else [1.0])])
-        self._sizes, self._size_of_others = np.zeros(residuals.functions.shape[0]), 0.0
+        self._sizes, self._size_of_others, self._size_of_pairs = np.zeros(residuals.functions.shape[0]), 0.0, 0.0
 
     def sums(self, values: np.ndarray) -> np.ndarray:
         """Return the sums of both sides (rows) of every condition (columns) over the collocation points."""
@@ -101,11 +101,12 @@ class ElementSigns:
         self._size_of_others = np.maximum(self._size_of_others, np.abs(others))
         slack = RELATIVE * np.abs(w) + ABSOLUTE
         pairs = V[f.cross]
+        self._size_of_pairs = np.maximum(self._size_of_pairs, np.abs(pairs))
         return bool(
             (others >= -RELATIVE * self._size_of_others - ABSOLUTE).all()
             and (w >= f.lower - slack).all()
             and (w <= f.upper + slack).all()
-            and (pairs.min(axis=0, initial=np.inf) <= ZERO * (1 + pairs.max(axis=0, initial=0.0))).all()
+            and (pairs <= ZERO * (1 + self._size_of_pairs)).any(axis=0).all()
         )
 
 

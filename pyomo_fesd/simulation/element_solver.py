@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from pyomo_fesd.core import TimeIndex, derivatives, moving_grids, phase
 from pyomo_fesd.simulation.determinacy import refuse_undetermined, refuse_undetermined_start
-from pyomo_fesd.simulation.element_class import ElementClass, ElementEnd
+from pyomo_fesd.simulation.element_class import ElementClass, ElementEnd, LeftBoundary
 from pyomo_fesd.simulation.equation_reader import EquationReader
 from pyomo_fesd.simulation.events import JumpEvents, read_hysteresis
 from pyomo_fesd.simulation.impacts import ImpactEvents
@@ -84,7 +84,7 @@ class ElementSolver:
             element_class.begin_pass()
         for modes in self._hysteresis:
             modes.begin(self._first)
-        self._end = ElementEnd(self._reader.active_set(self._first))
+        self._end = ElementEnd(self._reader.active_set(self._first), is_first=True)
 
     def begin_stage(self) -> None:
         """Begin a control stage: values of functions may jump with the controls."""
@@ -140,7 +140,7 @@ class ElementSolver:
         self._progress.check_time()
         equations = self._read(element)
         element_class, longest = self._class_of(equations, element), max(most, element.length)
-        found = element_class.newton_step(equations, self._end, most, lambda: self._values_before(equations, element))
+        found = element_class.newton_step(equations, self._end, most, lambda: self._left_boundary(equations, element))
         if found is None:
             found = self._mpcc_step(element_class, equations, most, TRIES[not warm :], NO_STEP * longest, element)
         h, end = found
@@ -173,7 +173,7 @@ class ElementSolver:
         if self._sizes is not None:
             element = self._grid.elements[0]
             equations = self._read(element)
-            self._sizes.learn(equations, self._values_before(equations, element))
+            self._sizes.learn(equations, self._left_boundary(equations, element).unknown)
 
     def _sized(self, equations):
         """The equations with factors by the sizes of their variables; without contacts as they are."""
@@ -182,9 +182,11 @@ class ElementSolver:
         self._sizes.learn(equations, [v.value for v in equations.unknown])
         return replace(equations, size_factor=self._sizes.factor)
 
-    def _values_before(self, equations, element):
-        """Values that the unknowns of an element have at its left boundary."""
-        return [self._value_at(v, element.left) if self._times.time(v) is not None else v.value for v in equations.unknown]
+    def _left_boundary(self, equations, element):
+        def values(variables):
+            return [self._value_at(v, element.left) if self._times.time(v) is not None else v.value for v in variables]
+
+        return LeftBoundary(values(equations.unknown), values(equations.known))
 
     def _value_at(self, v, label):
         """Value of the counterpart of a variable at another time, or its own without one."""

@@ -579,7 +579,7 @@ BAD = {
         'sgn[0]',
         r'dx\[0\], dy\[0\]',
     ),
-    'modes define nothing': (lists(lambda m, t: [m.x[t] <= 0], lambda m, t: [m.x[t] >= 0]), 'sgn[0]', 'no equality'),
+    'modes define nothing': (lists(lambda m, t: [m.x[t] <= 0], lambda m, t: [m.x[t] >= 0]), 'sgn[2]', 'no equality'),
     'modes define different algebraic variables': (
         with_flows(lambda m, t: [m.F[t] == 1], lambda m, t: [m.P[t] == 1]),
         'sgn[0]',

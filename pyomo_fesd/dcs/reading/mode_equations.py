@@ -39,6 +39,11 @@ class ModeEquations:
     used: list
     alike: list
 
+    @classmethod
+    def none(cls, equations: list) -> 'ModeEquations':
+        """Return those of modes that state regions alone, as they may at the first time: which mode begins."""
+        return cls([], [[] for _ in equations], equations, [[] for _ in equations], [])
+
     def swapped(self, swap: Swap, equations: list) -> 'ModeEquations':
         """Return the same for other variables, by a ``Swap``, and the ``equations`` that contain these."""
         others = Swap(chain(*self.equations), chain(*equations))

@@ -89,7 +89,8 @@ class SystemReader:
             regions = Regions([swap.expression(c) for c in first.regions.functions], first.regions.geometry)
             return ModeSystem(tree, modes, regions, first.equations.swapped(swap, equalities), first.laws)
         system = self._study(tree, modes, equalities, inequalities)
-        if key is not None:
+        # regions alone are right at the first time only
+        if key is not None and any(equalities):
             self._read[counts, key] = system, parts
         return system
 
@@ -114,6 +115,8 @@ class SystemReader:
 
     def _equations(self, disjunction, modes, equalities, inequalities):
         refuse_derivatives_in_regions(inequalities, self._variables)
+        if not any(equalities) and self._times.time(disjunction) == self._times.wrt.first():
+            return ModeEquations.none(equalities)
         choice = self._choices.setdefault(self._times.split(disjunction)[1], {})
         return read_equations(disjunction, modes, equalities, self._variables, choice)
 
