@@ -29,7 +29,10 @@ HOMOTOPIES = {
 
 @dataclass
 class Answer:
-    """Result of a method: the point, Ipopt's status there, the work; ``seconds`` counts nlpsol's construction and the NLPs."""
+    """Result of a method: the point, Ipopt's status there, the work.
+
+    ``seconds`` (wall) and ``cpu`` count nlpsol's construction and the NLPs.
+    """
 
     w: np.ndarray
     status: str = ''
@@ -37,6 +40,7 @@ class Answer:
     iterations: int = 0
     last: float = np.nan
     seconds: float = 0.0
+    cpu: float = 0.0
     residuals: tuple = field(default=(np.inf, np.inf), repr=False)
 
 
@@ -72,16 +76,16 @@ def solve(method, c, judge, limit):
         its time does not count
     limit : float, seconds
     """
-    started = time.perf_counter()
+    started, cpu = time.perf_counter(), time.process_time()
     solver, bounds, deadline = _build(method, c)
-    answer, w = Answer(c.x0, seconds=time.perf_counter() - started), c.x0
+    answer, w = Answer(c.x0, seconds=time.perf_counter() - started, cpu=time.process_time() - cpu), c.x0
     for parameter in HOMOTOPIES[method]:
         if answer.seconds > limit:
             break
-        started = time.perf_counter()
+        started, cpu = time.perf_counter(), time.process_time()
         deadline.until = started + limit - answer.seconds
         result = solver(x0=w, p=parameter, **bounds)
-        answer.seconds += time.perf_counter() - started
+        answer.seconds, answer.cpu = answer.seconds + time.perf_counter() - started, answer.cpu + time.process_time() - cpu
         stats, found = solver.stats(), np.asarray(result['x'], dtype=float).ravel()
         answer.nlps, answer.iterations = answer.nlps + 1, answer.iterations + int(stats['iter_count'])
         answer.last = parameter

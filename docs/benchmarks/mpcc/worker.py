@@ -6,12 +6,14 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+import pyomo.environ as pyo
 from benchmarks.common.processes import silence_output
 from benchmarks.mpcc import b_stationarity, baselines
 from benchmarks.mpcc.instance import Instance
 from pyomo.common.collections import ComponentMap
 from pyomo.common.timing import HierarchicalTimer
 from pyomo.contrib.solver.common.factory import SolverFactory
+from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd  # noqa: F401  registers mpec_hybrid
 from pyomo_fesd.mpcc.compile.compile import compile_mpcc
@@ -34,12 +36,22 @@ SOLVED = 1e-6
 def serve(pipe):
     """Answer each (path, method, limit) with two rows: first that of the run, then the same with the check of B-stationarity."""
     silence_output()
+    _warm_up()
     pipe.send('ready')
     while True:
         path, method, limit = pipe.recv()
         row, x = _run(path, method, limit)
         pipe.send(row)
         pipe.send(row | _check(path, x) if row.get('solved') else row)
+
+
+def _warm_up():
+    """Load the modules that a first solve imports: their time belongs to no instance."""
+    m = pyo.ConcreteModel()
+    m.x = pyo.Var([0, 1], bounds=(0, None), initialize=1)
+    m.pair = Complementarity(expr=complements(0 <= m.x[0], m.x[1] >= 0))
+    m.cost = pyo.Objective(expr=(m.x[0] - 1) ** 2 + (m.x[1] - 2) ** 2)
+    SolverFactory('mpec_hybrid').solve(m)
 
 
 def _run(path, method, limit):
@@ -86,11 +98,12 @@ def _functions(path):
 
 @lru_cache(1)
 def _compiled(path):
-    """The model and its compiled form, shared by the baselines; ``mpec_hybrid`` compiles a model of its own."""
+    """The model, its compiled form and the CPU seconds for it, shared by the baselines; ``mpec_hybrid`` compiles its own model."""
     import mpcc_json
 
-    m = mpcc_json.to_pyomo(_load(path))
-    return m, compile_mpcc(read_mpcc(m), HierarchicalTimer(), expanded=True)
+    m, started = mpcc_json.to_pyomo(_load(path)), time.process_time()
+    compiled = compile_mpcc(read_mpcc(m), HierarchicalTimer(), expanded=True)
+    return m, compiled, time.process_time() - started
 
 
 def _point(d, m, values):
@@ -123,7 +136,7 @@ def _residuals(mpcc_json, d, x):
 def _baseline(path, method, limit):
     import mpcc_json
 
-    d, (m, c) = _load(path), _compiled(path)
+    d, (m, c, compiling) = _load(path), _compiled(path)
 
     def point(w):
         return _point(d, m, ComponentMap(zip(c.variables, w)))
@@ -134,7 +147,7 @@ def _baseline(path, method, limit):
 
     answer = baselines.solve(method, c, judge, limit)
     row = {name: getattr(answer, name) for name in ('status', 'nlps', 'iterations')}
-    row |= {'eps_last': answer.last, 'time': answer.seconds, 'total': answer.seconds}
+    row |= {'eps_last': answer.last, 'time': compiling + answer.cpu, 'compile': compiling}
     return row, point(answer.w)
 
 
@@ -165,14 +178,14 @@ def _hybrid(path, method, limit):
 
     d = _load(path)
     m = mpcc_json.to_pyomo(d)
-    started = time.perf_counter()
+    started, cpu = time.perf_counter(), time.process_time()
     options = {'time_limit': limit, 'raise_exception_on_nonoptimal_result': False, 'load_solutions': False}
     results = SolverFactory('mpec_hybrid').solve(m, **options, **read_options(method))
-    total = time.perf_counter() - started
+    total, cpu = time.perf_counter() - started, time.process_time() - cpu
     info, timer = results.extra_info, results.timing_info.timer
     row = {name: _seconds(timer, name) for name in PHASES}
     row |= {'status': results.termination_condition.name, 'certified': info.stationarity == 'B', 'total': total}
-    row |= {'time': total - row['compile'], 'iterations': info.nlp_iterations}
+    row |= {'time': cpu, 'iterations': info.nlp_iterations}
     row |= {name: getattr(info, name) for name in ('nlps', 'lpecs', 'binaries', 'eps_last')}
     if not results.solution_loader.get_number_of_solutions():
         return row, None

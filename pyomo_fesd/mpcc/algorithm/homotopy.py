@@ -74,7 +74,7 @@ class Homotopy:
         form = self._options.relaxation
         self._paths = AUTO[self._c.has_objective] if form == 'auto' else ((form,) * 2,)
         self._recoveries = list(RECOVERIES)
-        self._position = _Position(0, start, self._options.eps_init)
+        self._position, self._cold = _Position(0, start, self._options.eps_init), {}
         self.end, self.finished = None, False
 
     def follow(self, patience=None):
@@ -92,7 +92,14 @@ class Homotopy:
     def _relax(self, position):
         form, duals = self._form(position), self._duals(position)
         budget = None if self._unlimited(position) else self._options.relaxation_iterations
-        return self._subsolves.relax(form, position.w, position.eps, duals, budget)
+        if duals is not None or len(self._paths) == 1:
+            return self._subsolves.relax(form, position.w, position.eps, duals, budget)
+        # two paths may begin with the same form: the same NLP has the same end
+        key = form, position.eps, position.w.tobytes(), self._c.lbx.tobytes()
+        known = self._cold.get(key)
+        if known is None or known.stopped:
+            self._cold[key] = known = self._subsolves.relax(form, position.w, position.eps, None, budget)
+        return known
 
     def _duals(self, position):
         """The multipliers to start from, or None."""
@@ -122,10 +129,10 @@ class Homotopy:
             # Ipopt's own centring finds its way again where its iterations have led
             self._subsolves.note("go on", relaxed.w)
             return replace(position, w=relaxed.w, goes_on=True)
-        if not self._recoveries or self._hopeless():
-            return None
         if self._fails_at_once(position):
             return self._begin(position.path + 1, "start again, other form", relaxed)
+        if not self._recoveries or self._hopeless():
+            return None
         recovery, options = self._recoveries.pop(0), self._options
         self._subsolves.note(recovery.note, relaxed.w)
         self._gap.restart()

@@ -21,13 +21,15 @@ from pyomo_fesd.mpcc.compile.hint_indices import (
     NeighbourIndices,
 )
 from pyomo_fesd.mpcc.compile.model_values import ModelValues, start_values, stated_bounds
-from pyomo_fesd.mpcc.compile.mpcc_functions import MpccData, MpccFunctions
+from pyomo_fesd.mpcc.compile.mpcc_data import MpccData
+from pyomo_fesd.mpcc.compile.mpcc_functions import MpccFunctions
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.parameters import parameter_values
 from pyomo_fesd.mpcc.compile.round_off import EXACT
 from pyomo_fesd.mpcc.compile.scaled_functions import LARGE, ScaledFunctions, ScaledRows
 from pyomo_fesd.mpcc.compile.scaling import Scale, side_factors
 from pyomo_fesd.mpcc.compile.sizes import beside, row_factors, variable_factors, without_small
+from pyomo_fesd.mpcc.compile.sparse_entries import largest_entries, with_entries
 
 UNBOUNDED = (-np.inf, np.inf)
 #: Variables of a nonlinear model that may be scaled by coefficients.
@@ -158,8 +160,10 @@ class _Assembly:
 
     def _of_expressions(self, functions, s_x):
         """The largest entry of the gradient of each function at the start; 0 where it has none."""
-        J = abs(csr(functions.jacobian(self._at(self._start))) @ sparse.diags(1 / s_x))
-        largest = J.max(axis=1).toarray().ravel() if 0 not in J.shape else np.zeros(J.shape[0])
+        if not len(functions.constants):
+            return np.zeros(0)
+        J = csr(functions.jacobian(self._at(self._start)))
+        largest = largest_entries(with_entries(J, J.data / s_x[J.indices]))
         return np.where(np.isfinite(largest), largest, 0.0)
 
     def _scaled_functions(self, scale, sign):

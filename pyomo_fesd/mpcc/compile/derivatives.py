@@ -6,7 +6,7 @@ separable and cheap, and the chain rule gives the rest:
 
     J = [J_g 0; T_z J_z  T_s],    hess L = hess_model(lam_f, lam_f weight, lam_g, L_z) + J_z' L_zz J_z  (and the parts in s)
 
-with L = lam_f C + lam_T T.
+with L = lam_f C + lam_T T.  Of a short model, casadi derives each NLP as a whole instead: that takes less time than to set this up.
 """
 
 from dataclasses import dataclass
@@ -55,6 +55,11 @@ class Outer:
         inputs, values = [self.z, self.s, self.parameter, of_f, of_rows], [z, s, parameter, lam_f, lam]
         return {name: _at(piece, inputs, values) for name, piece in pieces.items()}
 
+    def inserted(self, z) -> list:
+        """Return ``weight``, ``cost`` and ``rows`` at expressions (SX) of the inner functions."""
+        pieces = [ca.SX(self.weight), ca.SX(self.cost), self.rows]
+        return ca.substitute(pieces, [self.z], [z]) if z.numel() else pieces
+
 
 @dataclass(frozen=True)
 class Nlp:
@@ -75,57 +80,75 @@ def automatic(x: ca.SX, f: ca.SX, g: ca.SX) -> Derivatives:
 
 
 class ModelDerivatives:
-    """A compiled MPCC's functions and derivatives at expressions w and p.
+    """A compiled MPCC's functions and derivatives, found once and called by every NLP.
 
-    Attributes
+    Parameters
     ----------
-    f, penalty, g, G, H, equal : values
-    z : (G, H, equal)
-    gradient_f, gradient_penalty : columns
-    J_g, J_z : Jacobians
+    functions : ScaledFunctions
+    n, parameters, m, inner : int
+        numbers of variables, parameters, rows and inner functions (G, H, equal)
     """
 
-    def __init__(self, functions, w, p):
-        self._functions, self._at = functions, (w, p)
-        self.__dict__.update(functions.outputs(w, p))
-        self.z = ca.vertcat(self.G, self.H, self.equal)
-        cost = functions.cost.jacobian(w, p)
-        self.gradient_f, self.gradient_penalty = cost[0, :].T, cost[1, :].T
-        self.J_g, self.J_z = functions.rows.jacobian(w, p), functions.sides.jacobian(w, p)
+    def __init__(self, functions, n, parameters, m, inner):
+        kind, c = functions.kind, functions
+        w, p, of_cost, of_g, of_z = (
+            kind.sym(name, size) for name, size in (('w', n), ('p', parameters), ('of_cost', 2), ('of_g', m), ('of_z', inner))
+        )
+        cost, z = c.cost.values(w, p), c.sides.values(w, p)
+        self._values = ca.Function('values', [w, p], [cost, c.rows.values(w, p), z])
+        slopes = [rows.jacobian(w, p) for rows in (c.cost, c.rows, c.sides)]
+        self._slopes = ca.Function('slopes', [w, p], slopes)
+        parts = (c.cost, of_cost), (c.rows, of_g), (c.sides, of_z)
+        curvatures = [rows.hessian(w, p, factors) for rows, factors in parts]
+        self._hessian = ca.Function('hessian', [w, p, of_cost, of_g, of_z], [sum(curvatures[1:], curvatures[0])])
 
-    def hessian(self, of_f, of_penalty, of_g, of_z):
-        """Return the upper triangle of the Hessian of the functions with these factors."""
-        c = self._functions
-        parts = (c.cost, ca.vertcat(of_f, of_penalty)), (c.rows, of_g), (c.sides, of_z)
-        return sum((rows.hessian(*self._at, factors) for rows, factors in parts[1:]), parts[0][0].hessian(*self._at, parts[0][1]))
+    def values(self, w, p) -> list:
+        """Return (f, penalty), g and (G, H, equal) at expressions."""
+        return self._values.call([w, p])
+
+    def slopes(self, w, p) -> list:
+        """Return their Jacobians by w."""
+        return self._slopes.call([w, p])
+
+    def hessian(self, w, p, of_cost, of_g, of_z):
+        """Return the upper triangle of the Hessian by w of the functions with these factors."""
+        return self._hessian.call([w, p, of_cost, of_g, of_z])[0]
 
 
 def composed(c, outer: Outer) -> Nlp:
-    """Compose the ``Nlp`` of a compiled MPCC with the functions ``outer`` of its pairs and slacks by the chain rule.
+    """Compose the ``Nlp`` of a compiled MPCC with the functions ``outer`` of its pairs and slacks.
 
     Parameters
     ----------
     c : MpccFunctions
     outer : Outer
     """
-    kind, n, m, own = c.kind, len(c.x0), len(c.lbg), outer.parameter.numel()
+    return _inserted(c, outer) if c.short else _by_chain_rule(c, outer)
+
+
+def _inserted(c, outer):
+    """The ``Nlp`` of a short model: casadi derives its expressions in less time than the chain rule's matrices take to make."""
+    weight, cost, rows = outer.inserted(ca.vertcat(c.G, c.H, c.equal))
+    x, f, g = ca.vertcat(c.x, outer.s), c.f + weight * c.penalty + cost, ca.vertcat(c.g, rows)
+    return Nlp(x, ca.vertcat(outer.parameter, c.p), f, g, automatic(x, f, g))
+
+
+def _by_chain_rule(c, outer):
+    kind, n, m, own, d = c.kind, len(c.x0), len(c.lbg), outer.parameter.numel(), c.derivatives
     ns, rows = outer.s.numel(), outer.rows.numel()
     x, p = kind.sym('x', n + ns), kind.sym('p', own + len(c.parameters))
     lam_f, lam_g = kind.sym('lam_f'), kind.sym('lam_g', m + rows)
-    d = c.at(between(x, 0, n), between(p, own, p.numel()))
-    at = outer.at(d.z, between(x, n, n + ns), between(p, 0, own), lam_f, between(lam_g, m, m + rows))
-    chain = ca.diagcat(d.J_z, kind.eye(ns))
-    gradient = ca.vertcat(d.gradient_f + at['weight'] * d.gradient_penalty, kind(ns, 1)) + chain.T @ at['cost_gradient']
-    jacobian = ca.vertcat(ca.horzcat(d.J_g, kind(m, ns)), at['rows_jacobian'] @ chain)
-    model = d.hessian(lam_f, lam_f * at['weight'], between(lam_g, 0, m), at['factors'])
-    hessian = ca.diagcat(model, kind(ns, ns)) + ca.triu(chain.T @ at['hessian'] @ chain)
-    return Nlp(
-        x,
-        p,
-        d.f + at['weight'] * d.penalty + at['cost'],
-        ca.vertcat(d.g, at['rows']),
-        Derivatives(gradient, jacobian, hessian, lam_f, lam_g),
-    )
+    model = between(x, 0, n), between(p, own, p.numel())
+    (cost, g, z), (J_cost, J_g, J_z) = d.values(*model), d.slopes(*model)
+    at = outer.at(z, between(x, n, n + ns), between(p, 0, own), lam_f, between(lam_g, m, m + rows))
+    chain, weight = ca.diagcat(J_z, kind.eye(ns)), at['weight']
+    slopes = J_cost[0, :].T + weight * J_cost[1, :].T
+    gradient = ca.vertcat(slopes, kind(ns, 1)) + chain.T @ at['cost_gradient']
+    jacobian = ca.vertcat(ca.horzcat(J_g, kind(m, ns)), at['rows_jacobian'] @ chain)
+    of_model = d.hessian(*model, ca.vertcat(lam_f, lam_f * weight), between(lam_g, 0, m), at['factors'])
+    hessian = ca.diagcat(of_model, kind(ns, ns)) + ca.triu(chain.T @ at['hessian'] @ chain)
+    derivatives = Derivatives(gradient, jacobian, hessian, lam_f, lam_g)
+    return Nlp(x, p, cost[0] + weight * cost[1] + at['cost'], ca.vertcat(g, at['rows']), derivatives)
 
 
 def plain_nlp(c) -> Nlp:

@@ -10,10 +10,11 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from pyomo_fesd.mpcc.compile.derivatives import ModelDerivatives
 from pyomo_fesd.mpcc.compile.last_points import LastPoints
+from pyomo_fesd.mpcc.compile.numeric_function import NumericFunction
+from pyomo_fesd.mpcc.compile.stacked_jacobian import StackedJacobian
 
 
 @dataclass(frozen=True)
@@ -25,53 +26,6 @@ class Evaluation:
     G: np.ndarray
     H: np.ndarray
     eta: np.ndarray
-
-
-@dataclass
-class MpccData:
-    """The bounds, start values and facts of an MPCC besides its functions.
-
-    Attributes
-    ----------
-    lbx, ubx : arrays (n), the variables' bounds with the signs that plain-variable sides imply
-    lbg, ubg : arrays (m)
-    side_of : int array (2q), equal numbers for equal sides among G (first q) and H
-    guided : bool array (n), variables with guide bounds, whose own bounds belong to the method
-    guide_lbx, guide_ubx : arrays (n), bounds in the homotopy, tighter for these variables
-    x0 : array (n), the model's values projected to the bounds
-    parameters : array (l), values of the parameters that a new solve may change
-    missing : int, number of variables without a value
-    sign : +1.0, or -1.0 for a model that maximises (f is always minimised)
-    has_objective : bool
-    scale : Scale
-    neighbours : list of NeighbourIndices
-    coincidences : list of CoincidenceIndices
-    arrivals : list of ArrivalIndices
-    followers : FollowerIndices
-    fillings : list of FillingIndices
-    tentative : bool array, decisions that are dropped where they leave no solution
-    """
-
-    lbx: np.ndarray
-    ubx: np.ndarray
-    lbg: np.ndarray
-    ubg: np.ndarray
-    side_of: np.ndarray
-    guided: np.ndarray
-    guide_lbx: np.ndarray
-    guide_ubx: np.ndarray
-    x0: np.ndarray
-    parameters: np.ndarray
-    missing: int
-    sign: float
-    has_objective: bool
-    scale: object
-    neighbours: list
-    coincidences: list
-    arrivals: list
-    followers: object
-    fillings: list
-    tentative: np.ndarray
 
 
 class MpccFunctions:
@@ -107,29 +61,43 @@ class MpccFunctions:
         self.__dict__.update(functions.outputs(self.x, self.p))
         self._evaluated, self._differentiated = LastPoints(self._evaluate), LastPoints(self._gradients)
 
-    def at(self, w, p) -> ModelDerivatives:
-        """Return the functions and their derivatives at expressions ``w`` and ``p``."""
-        return ModelDerivatives(self._functions, w, p)
+    @cached_property
+    def derivatives(self) -> ModelDerivatives:
+        """The functions and their derivatives, to compose NLPs of."""
+        return ModelDerivatives(self._functions, len(self.x0), len(self.parameters), len(self.lbg), self.inner)
 
     @cached_property
     def _values(self):
-        return ca.Function('values', [self.x, self.p], [self.f, self.g, self.G, self.H, self.eta])
+        outputs = [self.f, self.g, self.G, self.H, self.eta]
+        return NumericFunction(ca.Function('values', [self.x, self.p], [ca.densify(output) for output in outputs]))
 
     @cached_property
     def _equal(self):
-        return ca.Function('equal', [self.x, self.p], [ca.densify(self.equal)])
+        return NumericFunction(ca.Function('equal', [self.x, self.p], [ca.densify(self.equal)]))
 
     @cached_property
     def _gauges(self):
-        return ca.Function('gauges', [self.x, self.p], [ca.densify(self.gauges)])
+        return NumericFunction(ca.Function('gauges', [self.x, self.p], [ca.densify(self.gauges)]))
 
     @cached_property
     def _jacobian(self):
-        """Function of the nonzeros of the Jacobians of f, g, G, H and equal, and the matrices that they belong to."""
-        c, at, q = self._functions, (self.x, self.p), self.pairs
-        sides = c.sides.jacobian(*at)
-        matrices = [c.cost.jacobian(*at)[0, :], c.rows.jacobian(*at), sides[:q, :], sides[q : 2 * q, :], sides[2 * q :, :]]
-        return ca.Function('jacobian', list(at), [J.nz[:] for J in matrices]), [_Pattern(J.sparsity()) for J in matrices]
+        """Function of the gradient of f and of the nonzeros of all rows' Jacobian, and the matrix that they belong to."""
+        at, q = (self.x, self.p), self.pairs
+        if self.short:
+            slopes = ca.jacobian(self.f, self.x)
+            blocks = [ca.jacobian(ca.vertcat(self.g, self.G, self.H, self.equal), self.x)]
+        else:
+            of_cost, *blocks = self.derivatives.slopes(*at)
+            slopes = of_cost[0, :]
+        pattern = StackedJacobian([J.sparsity() for J in blocks], [len(self.lbg), q, q, self.inner - 2 * q])
+        numbers = ca.vertcat(self.kind(0, 1), *(ca.vec(J.nz[:]) for J in blocks))
+        function = ca.Function('jacobian', list(at), [ca.densify(slopes), ca.densify(numbers)])
+        return NumericFunction(function), pattern, slopes.nnz()
+
+    @property
+    def short(self) -> bool:
+        """Whether the functions are so short that casadi differentiates them in no time."""
+        return self._functions.short
 
     @property
     def linear(self) -> bool:
@@ -143,6 +111,8 @@ class MpccFunctions:
 
     def parameter_terms(self, w) -> np.ndarray:
         """Return the sizes of the terms of parameters in g and in the sides at ``w``."""
+        if not self.p.numel():
+            return np.zeros(len(self.lbg) + 2 * self.pairs)
         parts = [rows.parameter_terms(w, self.parameters) for rows in (self._functions.rows, self._functions.sides)]
         return np.concatenate(parts)[: len(self.lbg) + 2 * self.pairs]
 
@@ -183,33 +153,38 @@ class MpccFunctions:
     @property
     def nonzeros(self):
         """Number of entries of each Jacobian."""
-        names = ('objective', 'constraints', 'G', 'H', 'decisions')
-        return {name: pattern.nonzeros for name, pattern in zip(names, self._jacobian[1])}
+        _, pattern, of_objective = self._jacobian
+        return dict(zip(('objective', 'constraints', 'G', 'H', 'decisions'), (of_objective, *pattern.nonzeros)))
 
     def evaluate(self, w) -> Evaluation:
         """f, g, G, H and eta at ``w``."""
         return self._evaluated(w, self.parameters)
 
     def _evaluate(self, w, parameters):
-        f, *others = (_read_only(v.full().ravel()) for v in self._values(w, parameters))
+        f, *others = (_read_only(numbers) for numbers in self._values(w, parameters))
         return Evaluation(float(f[0]), *others)
 
     def decided(self, w):
         """The residuals of the decisions' equations at ``w``."""
-        return np.asarray(self._equal(w, self.parameters), dtype=float).ravel()
+        return self._equal(w, self.parameters)[0]
 
     def measured(self, w):
         """The gauges at ``w``."""
-        return np.asarray(self._gauges(w, self.parameters), dtype=float).ravel()
+        return self._gauges(w, self.parameters)[0]
 
     def gradients(self, w):
         """Gradient of f (array) and Jacobians of g, G, H and the decisions' equations (scipy csr) at ``w``."""
-        return self._differentiated(w, self.parameters)
+        return self._differentiated(w, self.parameters)[1:]
+
+    def stacked_jacobian(self, w):
+        """The Jacobian of g, G, H and the decisions' equations, one upon another (scipy csr), at ``w``."""
+        return self._differentiated(w, self.parameters)[0]
 
     def _gradients(self, w, parameters):
-        function, patterns = self._jacobian
-        grad, *jacobians = (pattern.with_numbers(v.full().ravel()) for pattern, v in zip(patterns, function(w, parameters)))
-        return _read_only(grad.toarray().ravel()), *jacobians
+        function, pattern, _ = self._jacobian
+        slopes, numbers = function(w, parameters)
+        stacked, *parts = pattern.at(numbers)
+        return stacked, _read_only(slopes), *parts
 
     def violations(self, w, at=None):
         """How much each row (m) and each bound (n) is violated at ``w``."""
@@ -238,16 +213,3 @@ def _read_only(numbers):
     """An array that several callers may share."""
     numbers.flags.writeable = False
     return numbers
-
-
-class _Pattern:
-    """The entries of a casadi matrix in scipy's order."""
-
-    def __init__(self, sparsity):
-        numbers = np.arange(1.0, sparsity.nnz() + 1)
-        matrix = sparse.csc_matrix((numbers, np.array(sparsity.row()), np.array(sparsity.colind())), shape=sparsity.shape).tocsr()
-        self._order, self._matrix, self.nonzeros = matrix.data.astype(int) - 1, matrix, sparsity.nnz()
-
-    def with_numbers(self, numbers):
-        """csr with casadi's nonzeros ``numbers``."""
-        return sparse.csr_matrix((numbers[self._order], self._matrix.indices, self._matrix.indptr), shape=self._matrix.shape)

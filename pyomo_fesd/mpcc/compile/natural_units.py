@@ -180,8 +180,8 @@ def _bounds(c):
 def _evidence(c):
     """Constant coefficients and right-hand sides of rows and sides, and the coefficients of a quadratic objective."""
     points = _samples(c, np.ones(len(c.x0)))[:2]
-    here, there = [sparse.vstack(J[1:4], format='csr') for J in map(c.gradients, points)]
     at, q = c.evaluate(points[0]), len(c.side_of)
+    here, there = [c.stacked_jacobian(w)[: len(c.lbg) + q] for w in points]
     values = np.concatenate([at.g, at.G, at.H])
     bounds = [np.concatenate([b, np.zeros(q)]) for b in (c.lbg, c.ubg)]
     cancelling = c.parameter_terms(points[0])
@@ -214,12 +214,17 @@ def _linear(here, there, values, bounds, w, cancelling):
 def _quadratic(c, row):
     """The same of the objective, a row of its own."""
     n, none = len(c.x0), (np.zeros(0, dtype=int),) * 3 + (np.zeros(0),)
-    objective = ca.Function('f', [c.x, c.p], [c.f]).expand()
-    if not c.has_objective or objective.n_instructions() > LONG:
+    if not c.has_objective:
         return none
-    x, p = objective.sx_in(0), objective.sx_in(1)
-    hessian = ca.hessian(objective(x, p), x)[0]
-    if hessian.nnz() and any(ca.which_depends(ca.vertcat(*hessian.nonzeros()), x, 1, True)):
+    x, p, f = c.x, c.p, c.f
+    if not c.short:
+        objective = ca.Function('f', [x, p], [f]).expand()
+        if objective.n_instructions() > LONG:
+            return none
+        x, p = objective.sx_in()
+        f = objective(x, p)
+    hessian = ca.hessian(f, x)[0]
+    if hessian.nnz() and ca.depends_on(hessian.nz[:], x):
         return none
     H = csr(ca.Function('H', [x, p], [hessian])(c.x0, c.parameters)).tocoo()
     linear = c.gradients(np.zeros(n))[0]

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from pyomo_fesd.mpcc.compile.casadi_matrices import csr, dm
 from pyomo_fesd.mpcc.compile.row_classes import RowClass, without_cache
@@ -42,8 +41,13 @@ class RowFunctions:
     def values(self, x):
         """V at ``x``, a dense column."""
         kind = type(x)
-        parts = ca.vertcat(kind(0, 1), *(k.values(x) for k in self.classes))
-        return ca.densify(kind(ca.DM(self.constants)) + ca.mtimes(self._matrix, x) + self._values.column(parts))
+        found = kind(ca.DM(self.constants.tolist()))
+        if self.linear.nnz:
+            found = kind.binary(ca.OP_ADD, found, ca.mtimes(self._matrix, x))
+        if self.classes:
+            parts = ca.mtimes(self._places, ca.vertcat(*(k.values(x) for k in self.classes)))
+            found = kind.binary(ca.OP_ADD, found, parts)
+        return ca.densify(found)
 
     def jacobian(self, x):
         """Jacobian of V by the free variables at ``x``."""
@@ -83,22 +87,31 @@ class RowFunctions:
         return dm(self.linear)
 
     @cached_property
-    def _values(self):
-        return _Sum((len(self.constants), 1), *_together((k.rows.ravel(), np.zeros(k.rows.size, int)) for k in self.classes))
+    def _places(self):
+        """Ones where the values of the classes belong, a column each."""
+        rows = np.concatenate([k.rows.ravel() for k in self.classes]).tolist()
+        return ca.DM(ca.Sparsity(len(self.constants), len(rows), list(range(len(rows) + 1)), rows), 1.0)
 
     @cached_property
     def _slopes(self):
         """The sums of the free variables' slopes and of the parameters'."""
         rows, columns = _together(k.slope_places for k in self.classes)
-        of_free, (m, n) = columns < self.free, self.linear.shape
+        of_free, (m, n), A = columns < self.free, self.linear.shape, self.linear.tocoo()
+        inside = A.col < self.free
+        by_free = A.row[inside], A.col[inside], A.data[inside]
+        by_parameters = A.row[~inside], A.col[~inside] - self.free, A.data[~inside]
         return (
-            _Sum((m, self.free), rows, columns, of_free, self.linear[:, : self.free]),
-            _Sum((m, n - self.free), rows, columns - self.free, ~of_free, self.linear[:, self.free :]),
+            _Sum((m, self.free), rows, columns, of_free, by_free),
+            _Sum((m, n - self.free), rows, columns - self.free, ~of_free, by_parameters),
         )
 
     @cached_property
     def _curvatures(self):
         return _Sum((self.free, self.free), *_together(k.curvature_places for k in self.classes))
+
+
+#: No entries: rows, columns, numbers.
+_NOTHING = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 
 
 class _Sum:
@@ -110,21 +123,22 @@ class _Sum:
     rows, columns : int arrays, the entry of each number
     used : bool array, optional
         numbers that belong to this matrix
-    base : scipy matrix, optional
+    base : (rows, columns, numbers), optional
         added as well
     """
 
     def __init__(self, shape, rows, columns, used=None, base=None):
         used = np.arange(len(rows)) if used is None else np.flatnonzero(used)
-        base = (sparse.coo_matrix(shape) if base is None else base).tocoo()
-        flat = np.concatenate([columns[used], base.col]) * np.int64(shape[0]) + np.concatenate([rows[used], base.row])
+        base_rows, base_columns, base_numbers = _NOTHING if base is None else base
+        flat = np.concatenate([columns[used], base_columns]) * np.int64(shape[0]) + np.concatenate([rows[used], base_rows])
         places, entry = np.unique(flat, return_inverse=True)
         column, row = np.divmod(places, max(1, shape[0]))
         ends = np.searchsorted(column, np.arange(shape[1] + 1))
         self._sparsity = ca.Sparsity(*shape, ends.tolist(), row.tolist())
-        self._base = ca.DM(np.bincount(entry[len(used) :], base.data, len(places)))
-        terms = np.ones(len(used)), (entry[: len(used)], used)
-        self._terms = dm(sparse.csc_matrix(terms, shape=(len(places), len(rows))))
+        self._base = ca.DM(np.bincount(entry[len(used) :], base_numbers, len(places)).tolist())
+        # one entry in the column of each number that is used
+        before = np.searchsorted(used, np.arange(len(rows) + 1))
+        self._terms = ca.DM(ca.Sparsity(len(places), len(rows), before.tolist(), entry[: len(used)].tolist()), 1.0)
 
     def matrix(self, numbers):
         """The matrix of ``numbers`` (a column)."""
@@ -132,8 +146,6 @@ class _Sum:
         if not self._terms.nnz():
             return kind(ca.DM(self._sparsity, self._base))
         return kind(self._sparsity, ca.densify(kind(self._base) + ca.mtimes(self._terms, numbers)))
-
-    column = matrix
 
 
 def _together(places):

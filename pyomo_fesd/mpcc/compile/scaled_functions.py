@@ -13,6 +13,8 @@ from pyomo_fesd.mpcc.compile.row_functions import RowFunctions
 
 #: Operations and coefficients beyond which functions are MX: SX ones are faster, but take longer to make.
 LARGE = 20000
+#: Up to so many, casadi differentiates the expressions as a whole in less time than derivatives of classes take to assemble.
+SHORT = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,8 @@ class ScaledRows:
         return np.abs(self.factors) * self.functions.parameter_terms(self._model_values(ca.DM(w), ca.DM(p)))
 
     def _model_values(self, w, p):
-        return ca.vertcat(times(1 / self.x, w), p)
+        x = times(1 / self.x, w)
+        return ca.vertcat(x, p) if p.numel() else x
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,12 @@ class ScaledFunctions:
     others: ScaledRows
     pairs: int
     kind: type
+
+    @property
+    def short(self) -> bool:
+        """Whether all functions are SX and short."""
+        parts = (self.cost, self.rows, self.sides)
+        return self.kind is ca.SX and sum(part.functions.size for part in parts) <= SHORT
 
     @property
     def decisions(self) -> int:

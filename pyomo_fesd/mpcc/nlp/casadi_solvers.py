@@ -37,6 +37,8 @@ UNO_NAMES = {
 }
 #: casadi's status where it is more specific than Uno's own "not optimal point".
 UNIFIED = {'SOLVER_RET_LIMITED': 'iteration or time limit', 'SOLVER_RET_NAN': 'error'}
+#: Multipliers of parameters would take a derivative of their own (which Uno needs for other purposes).
+WITHOUT_PARAMETERS = {'calc_lam_p': False, 'no_nlp_grad': True}
 #: Statuses of the tiny problem that only refused options can cause.
 REFUSED = ('Invalid_Option', 'error')
 #: Statuses with which Ipopt leaves its iteration counter unset.
@@ -94,10 +96,10 @@ class _CasadiNlp(NlpSolver):
         # casadi's warnings would go to the stderr of the whole process
         settings = {'print_time': False, 'show_eval_warnings': False, 'iteration_callback': self._watch}
         if self.TAKES_DERIVATIVES:
-            settings |= _functions(x, p, f, g, derivatives or automatic(x, f, g))
+            settings |= WITHOUT_PARAMETERS | _functions(x, p, f, g, derivatives or automatic(x, f, g))
         self._make = lambda ours: ca.nlpsol(name, self.PLUGIN, {'x': x, 'p': p, 'f': f, 'g': g}, settings | {self.PLUGIN: ours})
         self._options, self._made = (budget, options), {}
-        self._f = ca.Function('f', [x, p], [f])
+        self._problem = [x, p], [f]
 
     @abstractmethod
     def _settings(self, budget, options, warm=False):
@@ -130,21 +132,24 @@ class _CasadiNlp(NlpSolver):
         solver = self._solver_for(duals is not None)
         self._watch.left = np.inf if max_iter is None else max_iter
         start = {} if duals is None else {'lam_x0': duals.lam_x, 'lam_g0': duals.lam_g}
+        given = {'x0': w0, 'p': p, 'lbx': lbx, 'ubx': ubx, 'lbg': lbg, 'ubg': ubg} | start
         with DeferredInterrupt() as self._watch.interrupt:
             try:
-                result = solver(x0=w0, p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg, **start)
+                # casadi converts an array several times
+                result = solver(**{name: ca.DM(numbers) for name, numbers in given.items()})
             except RuntimeError as error:
                 if 'An exception was raised in the solver' not in str(error):
                     raise
                 return self._failed(w0, p, len(lbg))
         stats = solver.stats()
-        w, lam_g, lam_x = (np.asarray(result[key], dtype=float).ravel() for key in ('x', 'lam_g', 'lam_x'))
+        w, lam_g, lam_x = (result[key].full().ravel() for key in ('x', 'lam_g', 'lam_x'))
         return NlpResult(w, float(result['f']), self._status(stats), _iterations(stats), lam_g, lam_x)
 
     def _failed(self, w0, p, m, status='error'):
         """The result if the solver returns no point."""
         w = np.array(w0, dtype=float)
-        return NlpResult(w, float(self._f(w, p)), status, 0, np.zeros(m), np.zeros(len(w)))
+        f = ca.Function('f', *self._problem)(w, p)
+        return NlpResult(w, float(f), status, 0, np.zeros(m), np.zeros(len(w)))
 
 
 class CasadiIpopt(_CasadiNlp):

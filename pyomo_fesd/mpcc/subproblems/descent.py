@@ -14,6 +14,8 @@ below FLOOR times the largest N of the objective alone are round-off of the NLP 
 
 import numpy as np
 
+from pyomo_fesd.mpcc.compile import major_index
+
 #: Terms below this part of the objective's largest gradient entry (or change of it) over the reach are round-off.
 FLOOR = 1e-8
 #: Smaller sizes are zero.
@@ -26,9 +28,9 @@ class Descent:
     Parameters
     ----------
     program : Program
-        without binaries
-    changes : callable -> list of (array (n), csr (m, n))
-        changes of cost and A, each along a displacement by the reach of every variable
+        without binaries; its rows are csr
+    changes : callable -> list of (array (n), callable y -> array (n))
+        changes of cost and of A' y, each along a displacement by the reach of every variable
     """
 
     def __init__(self, program, changes):
@@ -45,17 +47,17 @@ class Descent:
         p = self._p
         y = np.where(np.isneginf(p.low), np.minimum(y, 0.0), y)
         y = np.where(np.isposinf(p.high), np.maximum(y, 0.0), y)
-        (m, n), A = p.A.shape, p.A.tocoo()
-        entries, products = np.abs(A.data), np.abs(A.data) * np.abs(y)[A.row]
-        columns = -_least(p.cost - p.A.T @ y, p.lower, p.upper)
+        (m, n), A, row = p.A.shape, p.A, major_index(p.A)
+        entries, products = np.abs(A.data), np.abs(A.data) * np.abs(y)[row]
+        columns = -_least(p.cost - np.bincount(A.indices, A.data * y[row], n), p.lower, p.upper)
         rows = -_least(y, p.low, p.high)
-        size = (np.abs(p.cost) + np.bincount(A.col, products, n) + self._curvature(y)) * p.reach
+        size = (np.abs(p.cost) + np.bincount(A.indices, products, n) + self._curvature(y)) * p.reach
         floor = FLOOR * self._reach_of_objective()
         by_columns = _ratios(columns, size, floor)
         # a row's term is y_i times its slack: as large as its part in a column, and relative to what the row can move
         of_rows = np.zeros(m)
-        np.maximum.at(of_rows, A.row, products * (p.reach / np.where(size > SMALLEST, size, 1.0))[A.col])
-        extent = np.abs(y) * np.bincount(A.row, entries * p.reach[A.col], m)
+        np.maximum.at(of_rows, row, products * (p.reach / np.where(size > SMALLEST, size, 1.0))[A.indices])
+        extent = np.abs(y) * np.bincount(row, entries * p.reach[A.indices], m)
         by_rows = _ratios(rows, extent, floor) * np.minimum(of_rows, 1.0)
         return float(max(by_columns.max(initial=0.0), by_rows.max(initial=0.0)))
 
@@ -64,7 +66,7 @@ class Descent:
         return -value <= FLOOR * self._reach_of_objective()
 
     def _curvature(self, y):
-        along = [np.abs(cost - A.T @ y) for cost, A in self._known_changes()]
+        along = [np.abs(cost - of_rows(y)) for cost, of_rows in self._known_changes()]
         return np.max(along, axis=0) if along else 0.0
 
     def _reach_of_objective(self):

@@ -58,7 +58,8 @@ class Program:
         A.data *= np.repeat(self.reach, np.diff(A.indptr))
         A.data[np.abs(A.data) < NOISE] = 0.0
         A.eliminate_zeros()
-        largest = np.abs(A).max(axis=1).toarray().ravel() if A.shape[1] and A.shape[0] else np.zeros(A.shape[0])
+        largest = np.zeros(A.shape[0])
+        np.maximum.at(largest, A.indices, np.abs(A.data))
         rows, size = 1.0 / np.where(largest > 0, largest, 1.0), np.abs(cost).max(initial=0.0)
         A.data *= rows[A.indices]
         factor = 1.0 / size if size > 0 else 1.0

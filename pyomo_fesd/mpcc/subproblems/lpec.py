@@ -16,10 +16,12 @@ HiGHS is not called.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy import sparse
 
+from pyomo_fesd.mpcc.compile import major_index
 from pyomo_fesd.mpcc.nlp import Deadline, check_options
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO
 from pyomo_fesd.mpcc.subproblems.descent import Descent
@@ -140,23 +142,25 @@ class Lpec:
         high = [np.maximum(c.ubg - at.g, 0.0), 0.0, np.inf, 0.0, np.inf, 0.0, np.inf, np.inf, np.inf, np.inf]
         places = _places(sets, equal, len(c.lbg))
         low, high = (np.concatenate([np.broadcast_to(v, len(rows)) for v, rows in zip(by, places)]) for by in (low, high))
-        program = Program(gradients[0], _stacked(gradients)[np.concatenate(places)], low, high, lower, upper, reach)
+        program = Program(gradients[0], c.stacked_jacobian(w)[np.concatenate(places)], low, high, lower, upper, reach)
         return _Linearised(program, equal, G[gamma], H[gamma], J_G[gamma], J_H[gamma])
 
     def _changes(self, w, sets, equal):
-        """Changes of the gradient and of the rows along displacements of all variables by their sizes, within their bounds."""
+        """Changes of the gradient and of the rows' products with multipliers along displacements of all variables by their sizes.
+
+        The displacements are within the bounds.
+        """
         random, sizes = np.random.default_rng(SEED), _sizes(w)
-        here, changes = self._c.gradients(w), []
-        rows, A_here = np.concatenate(_places(sets, equal, len(self._c.lbg))), _stacked(here)
+        gradient, A_here, changes = self._c.gradients(w)[0], self._c.stacked_jacobian(w), []
+        rows = np.concatenate(_places(sets, equal, len(self._c.lbg)))
         for _ in range(DISPLACEMENTS):
             step = DISPLACEMENT * sizes * random.choice((-1.0, 1.0), size=len(w))
             within = [(w + s >= self._c.lbx) & (w + s <= self._c.ubx) for s in (step, -step)]
             step = np.where(within[0], step, np.where(within[1], -step, 0.0))
-            there = self._c.gradients(w + step)
-            cost = np.nan_to_num((there[0] - here[0]) / DISPLACEMENT, posinf=0.0, neginf=0.0)
-            A = (_stacked(there) - A_here)[rows]
-            A.data = np.nan_to_num(A.data / DISPLACEMENT, posinf=0.0, neginf=0.0)
-            changes.append((cost, A))
+            cost = np.nan_to_num((self._c.gradients(w + step)[0] - gradient) / DISPLACEMENT, posinf=0.0, neginf=0.0)
+            A = self._c.stacked_jacobian(w + step)
+            change = np.nan_to_num((A.data - A_here.data) / DISPLACEMENT, posinf=0.0, neginf=0.0)
+            changes.append((cost, partial(_product, A, change, rows)))
         return changes
 
     def _box(self, w, sets, reach, beyond, released):
@@ -168,7 +172,7 @@ class Lpec:
         lbx[inside], ubx[inside] = -np.inf, np.inf
         lower, upper = np.minimum(np.maximum(-reach, lbx - w), 0.0), np.maximum(np.minimum(reach, ubx - w), 0.0)
         settled = np.concatenate([sets.alpha, sets.beta]) & (self._sides.row_of < 0)
-        still = self._sides.fixings[np.flatnonzero(settled)].indices
+        still, _ = self._sides.variables(settled)
         lower[still] = upper[still] = 0.0
         return lower, upper
 
@@ -189,8 +193,7 @@ class Lpec:
         A, high = p.A, p.high
         if y:
             M_G, M_H = _big_m(at.J_G, at.G, p.lower, p.upper), _big_m(at.J_H, at.H, p.lower, p.upper)
-            either = sparse.bmat([[at.J_G, -sparse.diags(M_G)], [at.J_H, sparse.diags(M_H)]])
-            A = sparse.vstack([sparse.hstack([A, sparse.csr_matrix((A.shape[0], y))]), either])
+            A = _with_binaries(A, at.J_G, at.J_H, M_G, M_H)
             high = np.concatenate([high, -at.G, M_H - at.H])
         program = Program(
             np.concatenate([p.cost, np.zeros(y)]),
@@ -224,14 +227,15 @@ class Lpec:
         return replace(found, value=value, d=answer.d, descent=measured)
 
 
+def _product(A, numbers, rows, y):
+    """B' y with the ``rows`` of A (csr) that have other ``numbers`` as entries."""
+    factors = np.bincount(rows, y, A.shape[0])
+    return np.bincount(A.indices, numbers * factors[major_index(A)], A.shape[1])
+
+
 def _sizes(w):
     """The size of each variable at ``w``."""
     return np.maximum(1.0, np.abs(w))
-
-
-def _stacked(gradients):
-    """All rows: own, G, H, decisions."""
-    return sparse.vstack(gradients[1:], format='csr')
 
 
 def _places(sets, equal, m):
@@ -261,5 +265,15 @@ def _inner_shares(fillings, gamma):
 
 def _big_m(J, side, d_low, d_high):
     """The largest value that each side can take in the box."""
-    positive, negative = J.maximum(0), J.minimum(0)
-    return side + positive @ d_high + negative @ d_low
+    most = np.maximum(J.data, 0.0) * d_high[J.indices] + np.minimum(J.data, 0.0) * d_low[J.indices]
+    return side + np.bincount(major_index(J), most, J.shape[0])
+
+
+def _with_binaries(A, J_G, J_H, M_G, M_H):
+    """The rows A d,  J_G d - M_G y  and  J_H d + M_H y  of columns (d, y), all csr."""
+    (m, n), y = A.shape, len(M_G)
+    k = np.arange(y)
+    rows = [major_index(A), m + major_index(J_G), m + y + major_index(J_H), m + k, m + y + k]
+    columns, numbers = [A.indices, J_G.indices, J_H.indices, n + k, n + k], [A.data, J_G.data, J_H.data, -M_G, M_H]
+    places = np.concatenate(rows), np.concatenate(columns)
+    return sparse.csc_matrix((np.concatenate(numbers), places), shape=(m + 2 * y, n + y))

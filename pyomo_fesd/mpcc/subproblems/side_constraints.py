@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
+from pyomo_fesd.mpcc.compile import major_index
 from pyomo_fesd.mpcc.subproblems.active_set import FREE, G_ZERO, H_ZERO
 
 #: Agreement of a side's least value with 0.
@@ -47,19 +48,22 @@ class Sides:
 
     def constant(self, fixed):
         """Mask over the sides (2q) whose variables are all among the ``fixed`` (mask over the n variables)."""
-        return self._pattern @ (~fixed).astype(float) == 0
+        return np.bincount(self._side[~fixed[self.fixings.indices]], minlength=self.fixings.shape[0]) == 0
+
+    def variables(self, which):
+        """The variables of the sides in a mask (2q), and the bounds at which these sides are zero: 1 lower, 2 upper."""
+        inside = which[self._side]
+        return self.fixings.indices[inside], self.fixings.data[inside]
 
     @cached_property
-    def _pattern(self):
-        """Ones where a side contains a variable."""
-        pattern = self.fixings.copy()
-        pattern.data = np.ones_like(pattern.data)
-        return pattern
+    def _side(self):
+        """The side of each entry of ``fixings``."""
+        return major_index(self.fixings)
 
     def bounds(self, zero, lbx, ubx):
         """Bounds of the variables (from ``lbx`` and ``ubx``) in the branch of an assignment; they may contradict each other."""
-        fixed = self.fixings[np.flatnonzero(self.zero_rows(zero) & (self.row_of < 0))]
-        lower, upper = np.unique(fixed.indices[fixed.data == 1]), np.unique(fixed.indices[fixed.data == 2])
+        fixed, bound = self.variables(self.zero_rows(zero) & (self.row_of < 0))
+        lower, upper = fixed[bound == 1], fixed[bound == 2]
         low, high = lbx.copy(), ubx.copy()
         high[lower] = lbx[lower]
         low[upper] = ubx[upper]
@@ -72,16 +76,15 @@ class Sides:
     def take_bounds(self, other):
         """Let sides without a row be zero at the bounds of ``other``, for the present values of parameters."""
         self.fixings = other.fixings
-        self.__dict__.pop('_pattern', None)
+        self.__dict__.pop('_side', None)
 
 
 def sort_sides(c) -> Sides:
     """Sort the sides of a compiled MPCC."""
     if not c.pairs:
         return Sides(np.zeros(0, dtype=int), np.zeros(0, dtype=int), sparse.csr_matrix((0, len(c.x0))))
-    _, _, J_G, J_H, _ = c.gradients(c.x0)
-    at = c.evaluate(c.x0)
-    A = sparse.vstack([J_G, J_H]).tocsr()
+    at, m = c.evaluate(c.x0), len(c.lbg)
+    A = c.stacked_jacobian(c.x0)[m : m + 2 * c.pairs]
     # a product with a parameter that is zero now does not depend on the other factor
     A.eliminate_zeros()
     constant = np.concatenate([at.G, at.H]) - A @ c.x0
@@ -176,6 +179,6 @@ def _least(A, lower, upper):
     bound = np.where(A.data > 0, lower[A.indices], upper[A.indices])
     product = A.data * np.where(A.data == 0, 0.0, bound)
     least = np.zeros(A.shape[0])
-    np.add.at(least, np.repeat(np.arange(A.shape[0]), np.diff(A.indptr)), product)
+    np.add.at(least, major_index(A), product)
     direction = sparse.csr_matrix((np.where(A.data > 0, 1.0, 2.0), A.indices, A.indptr), shape=A.shape)
     return direction, least

@@ -10,6 +10,7 @@ from enum import Enum
 
 import numpy as np
 
+from pyomo_fesd.mpcc.compile import largest_entries
 from pyomo_fesd.mpcc.subproblems.active_set import active_sets
 
 
@@ -131,6 +132,4 @@ def _residuals(c, at, w, tolerances, gradients):
 
 def _scale(J):
     """max(1, largest entry) of each row."""
-    if 0 in J.shape:
-        return np.ones(J.shape[0])
-    return np.maximum(1.0, np.abs(J).max(axis=1).toarray().ravel())
+    return np.maximum(1.0, largest_entries(J))

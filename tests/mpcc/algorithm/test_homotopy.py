@@ -72,17 +72,43 @@ def test_a_certified_incumbent_that_the_gap_test_accepts_ends_it():
 
 
 def test_a_failed_relaxation_is_followed_by_the_recoveries_in_their_order():
-    m = mpcc_collection.infeasible()
-    # so many pairs that not all branches are searched first
-    m.a, m.b = pyo.Var(range(6), bounds=(0, None), initialize=1), pyo.Var(range(6), bounds=(0, None), initialize=1)
-    m.more = Complementarity(range(6), rule=lambda m, i: complements(m.a[i] >= 0, m.b[i] >= 0))
-    results = run(m, relaxation='scholtes', load_solutions=False)
+    results = run(infeasible_with_many_pairs(), relaxation='scholtes', load_solutions=False)
     notes = [step.status for step in results.extra_info.steps if step.kind == 'recovery']
     assert notes[: len(RECOVERIES)] == [recovery.note for recovery in RECOVERIES]
     eps = [step.eps for step in relaxations(results)]
     assert eps[2] == pytest.approx(eps[1] / np.sqrt(0.1))
     assert max(eps) == 100
     assert notes[len(RECOVERIES) : len(RECOVERIES) + 2] == ['search over the pairs', 'start elsewhere']
+
+
+def infeasible_with_many_pairs():
+    """So many pairs that not all branches are searched first."""
+    m = mpcc_collection.infeasible()
+    m.a, m.b = pyo.Var(range(6), bounds=(0, None), initialize=1), pyo.Var(range(6), bounds=(0, None), initialize=1)
+    m.more = Complementarity(range(6), rule=lambda m, i: complements(m.a[i] >= 0, m.b[i] >= 0))
+    return m
+
+
+def test_no_relaxation_is_solved_twice_where_two_paths_begin_with_one_form():
+    m = infeasible_with_many_pairs()
+    m.no_point = pyo.Constraint(expr=sum(m.a[i] ** 2 for i in m.a) <= -1)
+    steps = run(m, load_solutions=False).extra_info.steps
+    notes = [step.status for step in steps if step.kind == 'recovery']
+    until = steps[: [step.status for step in steps].index(RECOVERIES[0].note)]
+    assert notes[:3] == ['start again, other form', 'start again, other form', RECOVERIES[0].note]
+    assert [step.kind for step in until if step.kind != 'recovery'] == ['relaxation', 'relaxation']
+
+
+def test_the_next_form_is_tried_before_all_branches_are_searched():
+    """The elastic form falls without bound, where the row does not hold."""
+    m = small_mpccs.pair(0.5, 0.5)
+    m.z = pyo.Var(initialize=0.3)
+    m.row = pyo.Constraint(expr=m.z == m.x * m.y)
+    m.f = pyo.Objective(expr=(m.x - 1) ** 2 + (m.y - 2) ** 2 - 100 * m.z)
+    results = run(m)
+    notes = [step.status for step in results.extra_info.steps if step.kind == 'recovery']
+    assert notes.index('start again, other form') < notes.index('search over the pairs')
+    assert results.extra_info.stationarity == 'B'
 
 
 def test_a_relaxation_that_its_budget_stops_goes_on_once_from_where_it_is():

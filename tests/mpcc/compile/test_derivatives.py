@@ -13,6 +13,7 @@ from problems.parts import compiled
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import BranchConstraint, Penalty, homotopy_hints
+from pyomo_fesd.mpcc.compile import scaled_functions
 from pyomo_fesd.mpcc.compile.derivatives import Outer, automatic, composed
 from pyomo_fesd.mpcc.subproblems.branch import Branch
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS, Relaxation
@@ -84,6 +85,14 @@ PROBLEMS = {
 }
 
 
+@pytest.fixture(scope='module', autouse=True)
+def by_the_chain_rule():
+    """No problem counts as short: casadi's own derivatives are those to compare with."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scaled_functions, 'SHORT', -1)
+        yield
+
+
 @pytest.fixture(params=PROBLEMS)
 def c(request):
     return PROBLEMS[request.param]()
@@ -130,6 +139,25 @@ def test_the_branch_nlp(c):
     agree(x, p, *rest, random_points(x.numel(), c.parameters))
 
 
+@pytest.mark.parametrize('form', ['elastic', 'l1', 'scholtes'])
+def test_short_problems_get_the_same_nlp(c, form, monkeypatch):
+    def handed():
+        x, p, f, g, d = made(lambda make: Relaxation(c, sort_sides(c), RELAXATIONS[form][1], make))
+        outputs = [f, g, d.gradient, d.jacobian, d.hessian]
+        return ca.Function('nlp', [x, p, d.lam_f, d.lam_g], [ca.densify(output) for output in outputs])
+
+    assert not c.short
+    long = handed()
+    monkeypatch.setattr(scaled_functions, 'SHORT', 10**9)
+    assert c.short
+    short, random = handed(), np.random.default_rng(3)
+    for w, values in random_points(long.numel_in(0), c.parameters):
+        at = w, values, random.normal(), random.normal(size=long.numel_in(3))
+        for found, wanted in zip(short(*at), long(*at)):
+            assert found.shape == wanted.shape
+            np.testing.assert_allclose(np.array(found), np.array(wanted), rtol=1e-9, atol=1e-9)
+
+
 @pytest.mark.parametrize('form', ['kanzow_schwartz', 'steffensen_ulbrich'])
 @pytest.mark.parametrize('x, y', [(2.0, 2.0), (0.01, 0.02), (3.0, 0.001), (0.001, 3.0), (0.2, 0.25)])
 def test_every_piece_of_a_piecewise_form(form, x, y):
@@ -157,7 +185,7 @@ def test_the_models_hessian_is_that_of_its_lagrangian(c):
     for weights, rows in ((factors[2], c.g), (of_z, inner)):
         for weight, row in zip(weights, ca.vertsplit(rows) if rows.numel() else []):
             lagrangian += weight * row
-    found = c.at(c.x, c.p).hessian(*factors, of_z)
+    found = c.derivatives.hessian(c.x, c.p, ca.vertcat(*factors[:2]), factors[2], of_z)
     wanted = ca.triu(ca.hessian(lagrangian, c.x)[0])
     both = ca.Function('h', [c.x, c.p], [ca.densify(found), ca.densify(wanted)])(w, c.parameters)
     np.testing.assert_allclose(np.array(both[0]), np.array(both[1]), atol=1e-10)
@@ -191,6 +219,7 @@ def test_product_rule(w, lam_f, lam):
 @given(a=numbers, b=numbers)
 def test_the_hessian_is_linear_in_its_factors(a, b):
     c = compiled_toy()
-    d, one, none = c.at(ca.DM([0.7, 0.4]), ca.DM(0, 1)), ca.DM.ones(c.inner), ca.DM(0, 1)
-    h = [d.hessian(*f).full() for f in ((a, b, none, one), (a, 0.0, none, one), (0.0, b, none, one), (0.0, 0.0, none, one))]
+    one, none = ca.DM.ones(c.inner), ca.DM(0, 1)
+    pairs = (a, b), (a, 0.0), (0.0, b), (0.0, 0.0)
+    h = [c.derivatives.hessian(ca.DM([0.7, 0.4]), none, ca.DM(of_cost), none, one).full() for of_cost in pairs]
     np.testing.assert_allclose(h[0] + h[3], h[1] + h[2], atol=1e-9)

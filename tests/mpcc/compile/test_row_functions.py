@@ -11,13 +11,21 @@ from problems.parts import compiled
 from pyomo.mpec import Complementarity, complements
 from pyomo.repn.plugins.nl_writer import NLWriter
 
-from pyomo_fesd.mpcc.compile import assemble, grouped_rows
+from pyomo_fesd.mpcc.compile import assemble, grouped_rows, scaled_functions
 from pyomo_fesd.mpcc.compile.derivatives import automatic, plain_nlp
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS, Relaxation
 from pyomo_fesd.mpcc.subproblems.side_constraints import sort_sides
 
 #: (kind, parts of equal form that make a class)
 WAYS = [(ca.SX, 1), (ca.SX, 1000), (ca.MX, 1), (ca.MX, 1000)]
+
+
+@pytest.fixture(scope='module', autouse=True)
+def by_classes():
+    """No model counts as short: derivatives are those of the classes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scaled_functions, 'SHORT', -1)
+        yield
 
 
 def in_one_way(model, kind, alike, parameters=()):
