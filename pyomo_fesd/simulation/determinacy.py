@@ -1,9 +1,10 @@
 """A simulation needs zero degrees of freedom: find and name unknowns that no equation or condition determines."""
 
+from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
+from pyomo.common.collections import ComponentSet
 from pyomo.core.base.var import VarData
 from pyomo.core.expr import EqualityExpression
 from scipy.sparse import csr_matrix
@@ -39,29 +40,35 @@ def refuse_undetermined(equations: ElementEquations) -> None:
 
 def refuse_undetermined_start(equations: ElementEquations, states: Sequence[VarData]) -> None:
     """Refuse ``states`` that are neither fixed at the first time nor determined by the ``equations`` there."""
-    others = [v for v in equations.unknown if not any(v is x for x in states)]
-    for k, state in enumerate(states, start=1):
-        ranks = [structural_rank(_incidence(equations, unknown)) for unknown in (others, [*others, *states[:k]])]
-        if ranks[1] - ranks[0] < k:
-            free = _free_beside(equations, state, others)
-            raise FesdError(
-                state,
-                "simulate: this state is neither fixed at the first time nor determined by equations there" + _named(free),
-                "fix its initial value" + (f", or '{free.name}'" if free is not None else ''),
-            )
+    chosen = ComponentSet(states)
+    others = [v for v in equations.unknown if v not in chosen]
+    incidence, known = _incidence(equations, [*others, *states]), len(others)
+    alone = structural_rank(incidence[:, :known])
+
+    def undetermined(count):
+        return alone + count - structural_rank(incidence[:, : known + count])
+
+    if undetermined(len(states)):
+        first = bisect_left(range(len(states) + 1), 1, key=undetermined) - 1
+        free = _free_beside(incidence, known + first, others)
+        raise FesdError(
+            states[first],
+            "simulate: this state is neither fixed at the first time nor determined by equations there" + _named(free),
+            "fix its initial value" + (f", or '{free.name}'" if free is not None else ''),
+        )
 
 
-def _free_beside(equations, state, others):
-    """An unknown that only the equation of a state contains, so that this determines neither; None where there is none."""
-    for row in equations.all_rows:
-        inside = list(variables_that_count(row))
-        if any(v is state for v in inside):
-            rest = replace(equations, rows=[other for other in equations.rows if other is not row])
-            counted = structural_rank(_incidence(rest, others))
-            for v in inside:
-                without = [u for u in others if u is not v]
-                if len(without) < len(others) and structural_rank(_incidence(rest, without)) == counted:
-                    return v
+def _free_beside(incidence, state, others):
+    """An unknown that only the equation of a state contains, so that this determines neither; None where there is none.
+
+    ``state`` is the column of a state; those of ``others`` come first.
+    """
+    for row in incidence[:, [state]].nonzero()[0]:
+        rest = incidence[np.delete(np.arange(incidence.shape[0]), row), : len(others)]
+        counted = structural_rank(rest)
+        for column in incidence[row, : len(others)].nonzero()[1]:
+            if structural_rank(rest[:, np.delete(np.arange(len(others)), column)]) == counted:
+                return others[column]
     return None
 
 

@@ -17,6 +17,9 @@ from pyomo_fesd.simulation.element_residuals import ElementResiduals
 
 #: The MPCC and Newton's method have found the same element if their lengths differ by less than this part of it.
 SAME = 1e-5
+#: A solution is followed from the first part of an element's length, each length at most so many times the one before, until only a
+#: growth below the last number is possible.
+FIRST, GROWTH, LEAST_GROWTH = 1e-6, 10.0, 1.05
 
 
 @dataclass(frozen=True)
@@ -107,15 +110,41 @@ class ElementClass:
         """
         if before.active is None or self._stepper is None:
             return None
+        goes_on = before.active.keys() >= set(self._stepper.names)
+        values = self._values if goes_on and self._values is not None else at_left().unknown
+        active, left, event = self._at_begin(equations, before, values, at_left)
+        with phase(self._timer, 'newton'):
+            return self._newton(equations, active, left, most, values, event)
+
+    def followed(self, equations: ElementEquations, before: ElementEnd, most: float, at_left: LeftBoundary) -> float:
+        """Return the length, at most ``most``, up to which Newton's method follows a solution from the left boundary.
+
+        It is 0 where the active set is unknown.  Short elements are solved from the values there, and longer ones from shorter ones.
+        """
+        if before.active is None or self._stepper is None:
+            return 0.0
+        active, left, event = self._at_begin(equations, before, at_left.unknown, lambda: at_left)
+        self._residuals.set_known(known_values(equations))
+        w, length, reached, growth = self._residuals.point(at_left.unknown), FIRST * most, 0.0, GROWTH
+        while reached < most and growth > LEAST_GROWTH:
+            step = self._stepper.step(w, active, length / self.nominal, left, event)
+            if step is not None:
+                w, reached = step.w, length
+            elif reached == 0:
+                break
+            else:
+                growth **= 0.5
+            length = min(growth * reached, most)
+        return reached
+
+    def _at_begin(self, equations, before, values, at_left):
+        """The active set at the beginning of an element, the values of all functions on the left, and the event there."""
         names = self._stepper.names
         goes_on = before.active.keys() >= set(names)
-        values = self._values if goes_on and self._values is not None else at_left().unknown
         guess = {} if goes_on else self._guess(equations, values)
         active = np.array([before.active.get(name, guess.get(name)) for name in names], dtype=bool)
         event = None if before.event is None or before.event[0] not in names else 2 * names.index(before.event[0]) + before.event[1]
-        with phase(self._timer, 'newton'):
-            left = self._functions_on_left(before, goes_on, at_left)
-            return self._newton(equations, active, left, most, values, event)
+        return active, self._functions_on_left(before, goes_on, at_left), event
 
     def _functions_on_left(self, before, goes_on, at_left):
         """Values of all functions at the left boundary; nan where they are unknown."""

@@ -27,8 +27,10 @@ TRIES = (
     {'lpec': 'full'},
     {'lpec': 'full', 'starts': 6},
 )
+#: Where a solution can be followed for less than this part of a step, and no step is found, other searches and starts do not help.
 #: A step of length zero is a local solution of its own where a switch lies on the left boundary.  Then lengths of at least these
 #: parts of the aim are asked for; a step is longer by the last part, else the bound holds it.
+ENDS = 1e-3
 LEAST, BEYOND, LONGER = (1e-2, 1e-4), {'lpec': 'full', 'relaxation': 'elastic'}, 1e-3
 
 
@@ -206,6 +208,10 @@ class ElementSolver:
                     is_stuck, h = True, self._length_beyond(element_class, equations, most)
                 if h > no_step:
                     return element_class.accept_mpcc(equations, most, h)
+                continue
+            reached = element_class.followed(equations, self._end, most, self._left_boundary(equations, element))
+            if 0 < reached < ENDS * most:
+                raise self._solution_ends(most, reached, answer)
         raise self._no_step(element_class, equations, most, answer, element)
 
     def _length_beyond(self, element_class, equations, most):
@@ -220,6 +226,14 @@ class ElementSolver:
         found = element_class.mpcc_step(equations, most, options, least)
         self._progress.check_time()
         return found
+
+    def _solution_ends(self, most, reached, answer):
+        return self._progress.error(
+            f"no step of length {most:.6g} was found from time {self._progress.time:.6g}: {answer.outcome}; steps from there are "
+            f"solved up to a length of {reached:.3g}, and longer ones are not",
+            "check the equations and the values there: the solution ends or bursts within that length, as from initial values that "
+            "are far from any balance; where it is only steep, elements of that length help",
+        )
 
     def _no_step(self, element_class, equations, most, answer, element):
         mpcc, now = element_class.mpcc, f"{self._progress.time:.6g}"

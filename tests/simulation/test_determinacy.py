@@ -4,8 +4,10 @@ import gas_liquid_tank
 import pyomo.environ as pyo
 import pytest
 import signum
+from pyomo.dae import DerivativeVar
 
 from pyomo_fesd import FesdError, simulate
+from pyomo_fesd.simulation import determinacy
 from pyomo_fesd.simulation.determinacy import refuse_undetermined
 from tests.models import scalar_ode
 from tests.problems import air_friction, dumped, quadratic_drag, relay_of_states, resting_ball, sliding, weir
@@ -84,3 +86,34 @@ def test_equal_bounds_state_an_equation():
     m.other = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == m.x[t])
     simulate(move(m, 2))
     assert m.x[2].value == pytest.approx(2.0) and m.y[2].value == pytest.approx(3.0)
+
+
+def test_the_first_of_several_states_without_a_value_is_named():
+    m = scalar_ode(x0=0.0)
+    m.x[0].unfix()
+    m.rate = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == 1)
+    m.other = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == m.x[t])
+    with pytest.raises(FesdError, match=r"x\[0\].*neither fixed at the first time") as error:
+        simulate(move(m, 2))
+    assert 'fix its initial value' in error.value.fix
+
+
+def test_equations_are_read_once_for_all_states(monkeypatch):
+    """Reading them for each state took the time of the square of the states."""
+    m = scalar_ode(x0=0.0)
+    m.line = pyo.Set(initialize=range(20))
+    m.z = pyo.Var(m.t, m.line, initialize=1.0)
+    m.dz = DerivativeVar(m.z, wrt=m.t)
+    m.z[0, :].fix(1.0)
+    m.rate = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == 1)
+    m.other = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == 0)
+    m.rates = pyo.Constraint(m.t, m.line, rule=lambda m, t, i: m.dz[t, i] == -m.z[t, i])
+    m.begin = pyo.Constraint(m.line, rule=lambda m, i: m.z[0, i] == 1.0)
+    m.y[0].fix(0.0)
+    m.z[0, :].unfix()
+    read = []
+    original = determinacy.variables_that_count
+    monkeypatch.setattr(determinacy, 'variables_that_count', lambda row: read.append(row) or original(row))
+    simulate(move(m, 1, 1))
+    # both sides of an equation are one row: at the first time once, in the element once
+    assert len(read) == len({id(row) for row in read})

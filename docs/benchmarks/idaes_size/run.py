@@ -97,18 +97,20 @@ def measure(nfe, variant):
 
 def draw(table):
     """Seconds of each phase over the number of elements."""
-    figure = Figure(figsize=(6, 4), layout='constrained')
+    figure = Figure(figsize=(7, 4), layout='constrained')
     axis, smooth = figure.subplots(), table[table['variant'] == 'smooth, fixed grid, element by element']
     table = table[table['variant'] == 'all calls']
     for phase in PHASES:
         axis.loglog(table['elements'], table[f'{phase} (s)'], 'o-', label='simulate' if phase == 'march' else phase)
-    seconds = smooth['march (s)'] + smooth['solve (s)']
-    axis.loglog(smooth['elements'], seconds, 'k--', label='smooth, fixed grid:\nelement by element, and solve')
+    seconds = smooth[['march (s)', 'solve (s)']].sum(axis=1)
+    axis.loglog(smooth['elements'], seconds, 'k--', label='smooth, fixed grid:\nelement by element,\nand solve')
+    stopped = smooth['solve (s)'].isna()
+    axis.loglog(smooth['elements'][stopped], seconds[stopped], 'k^', label='stopped before its end')
     axis.set_xticks(table['elements'], table['elements'], minor=False)
     axis.set_xticks([], minor=True)
     axis.set_xlabel('elements')
     axis.set_ylabel('CPU time (s)')
-    axis.legend()
+    figure.legend(loc='outside right upper')
     return figure
 
 
