@@ -119,7 +119,7 @@ class ElementClass:
     def followed(self, equations: ElementEquations, before: ElementEnd, most: float, at_left: LeftBoundary) -> float:
         """Return the length, at most ``most``, up to which Newton's method follows a solution from the left boundary.
 
-        It is 0 where the active set is unknown.  Short elements are solved from the values there, and longer ones from shorter ones.
+        It is 0 where the active set is unknown.  Short elements are solved from the values there, longer ones from shorter ones.
         """
         if before.active is None or self._stepper is None:
             return 0.0
