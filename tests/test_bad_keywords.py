@@ -53,6 +53,7 @@ CASES = [
     *((transform('finite_elements'), ready, name, [2.5, *NOT_POSITIVE]) for name in ('nfe', 'ncp')),
     (transform('finite_elements'), ready, 'nfe', [[0], ['a'], [1, 2, 3]]),
     (transform('finite_elements'), ready, 'ncp', [13, 60]),
+    (transform('finite_elements'), ready, 'fixed_points', ['a', None, 0.5, True, [0], [-1.0], [nan], ['a'], *NEVER]),
     (transform('finite_elements'), ready, 'rho', [-1, inf, *NO_NUMBERS]),
     (transform('finite_elements'), ready, 'length_bounds', [-1, 1, *NO_NUMBERS]),
     *(

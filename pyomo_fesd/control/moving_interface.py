@@ -45,7 +45,7 @@ class MovingModelInterface(DynamicModelInterface):
     @property
     def stage(self) -> float:
         """Duration of the first control stage."""
-        elements = self.moving.grid.stages[self.moving.grid.elements[0].stage]
+        elements = self.moving.grid.control_stages[0]
         return elements[-1].right - elements[0].left
 
     @property
@@ -83,7 +83,7 @@ class MovingModelInterface(DynamicModelInterface):
 
     def _refuse_inner_ends(self, data):
         first, last = self.time.first(), self.time.last()
-        known = [*(e.left for e in self.moving.grid.elements if e.opens_stage), last]
+        known = [*(e.left for e in self.moving.grid.elements if e.inputs_change), last]
         for end in (end for interval in data.get_intervals() for end in interval):
             near = min(known, key=lambda label: abs(label - end))
             if first <= end <= last and abs(near - end) > SAME * self.stage:

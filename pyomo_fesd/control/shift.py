@@ -136,9 +136,9 @@ def _elements_within(moving, dt):
     wrt, elements = moving.wrt, moving.grid.elements
     if moving.sigma is not None:
         raise FesdError(wrt, "shift: its final time or stage lengths are free", "give the control stages a fixed duration")
-    ends = [e.n for e in elements if e.opens_stage and abs(e.left - wrt.first() - dt) <= SAME * dt]
+    ends = [e.n for e in elements if e.inputs_change and abs(e.left - wrt.first() - dt) <= SAME * dt]
     if not ends:
-        stages = sorted(e.left - wrt.first() for e in elements if e.opens_stage and e.n > 1)
+        stages = sorted(e.left - wrt.first() for e in elements if e.inputs_change and e.n > 1)
         shown = ', '.join(f'{t:g}' for t in stages[:5]) + ', ...' * (len(stages) > 5)
         raise FesdError(wrt, f"shift: no control stage begins {dt:g} after the first time", f"take one of {shown or 'none'}")
     by = ends[0] - 1

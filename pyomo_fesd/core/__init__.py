@@ -33,6 +33,7 @@ from pyomo_fesd.core.grid import (
     numbers_of_elements,
     read_grid,
     share_elements,
+    with_points,
 )
 from pyomo_fesd.core.held_controls import held_controls
 from pyomo_fesd.core.homotopy_hints import (

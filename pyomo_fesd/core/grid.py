@@ -2,7 +2,7 @@
 
 import sys
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -32,9 +32,11 @@ class Element:
     n : int
         1..N
     stage : int
-        control stage that it lies in, 1..
+        stretch between two boundaries that keep their physical time, 1..: a control stage, or a part of one between fixed points
     opens_stage : bool
-        whether it is the first of its control stage
+        whether it is the first of its stage
+    inputs_change : bool
+        whether inputs may change where it begins: at the first time and boundaries of control stages, not at fixed points
     left, right : float
         boundary labels
     points : tuple of float
@@ -44,6 +46,7 @@ class Element:
     n: int
     stage: int
     opens_stage: bool
+    inputs_change: bool
     left: float
     right: float
     points: tuple
@@ -83,11 +86,21 @@ class Grid:
 
     @cached_property
     def stages(self) -> dict[int, list[Element]]:
-        """The elements of each control stage."""
+        """The elements of each stage: they share its length."""
         return {stage: list(elements) for stage, elements in groupby(self.elements, key=lambda e: e.stage)}
 
+    @cached_property
+    def control_stages(self) -> list[list[Element]]:
+        """The elements of each control stage: no input changes inside."""
+        found = []
+        for element in self.elements:
+            if element.inputs_change:
+                found.append([])
+            found[-1].append(element)
+        return found
+
     def inner_boundaries(self) -> Iterator[tuple[Element, Element]]:
-        """Yield the two elements beside each boundary inside a control stage."""
+        """Yield the two elements beside each boundary inside a stage."""
         for elements in self.stages.values():
             yield from zip(elements, elements[1:])
 
@@ -98,7 +111,7 @@ class Grid:
         return owner
 
 
-def read_grid(wrt: ContinuousSet, stages: list[float]) -> Grid:
+def read_grid(wrt: ContinuousSet, stages: list[float], fixed_points: Iterable[float] = ()) -> Grid:
     """Read the grid of a discretised ContinuousSet.
 
     Parameters
@@ -106,11 +119,13 @@ def read_grid(wrt: ContinuousSet, stages: list[float]) -> Grid:
     wrt : ContinuousSet
     stages : list of float
         labels of the control-stage boundaries, first and last time included
+    fixed_points : iterable of float
+        labels of other boundaries that keep their physical time
 
     Raises
     ------
     FesdError
-        for difference schemes that connect two elements, and for stage boundaries that are not element boundaries
+        for difference schemes that connect two elements, and for stage boundaries or fixed points that are not element boundaries
     """
     info = wrt.get_discretization_info()
     if info['scheme'] not in ONE_ELEMENT_SCHEMES:
@@ -121,12 +136,11 @@ def read_grid(wrt: ContinuousSet, stages: list[float]) -> Grid:
         )
     tau = tuple(float(c) for c in info.get('tau_points', (0.0, 1.0)) if c > 0)
     tau = (*tau[:-1], 1.0) if abs(tau[-1] - 1) < 1e-12 else tau
-    boundaries, points, opening = list(wrt.get_finite_elements()), list(wrt), set(stages)
-    stray = sorted(opening.difference(boundaries))
-    if stray:
-        raise FesdError(
-            wrt, f"the control-stage boundaries {stray} are not element boundaries", "discretise with these points in the set"
-        )
+    boundaries, points, changing = list(wrt.get_finite_elements()), list(wrt), set(stages)
+    opening = sorted(changing.union(fixed_points))
+    for name, given in (('control-stage boundaries', changing), ('fixed points', opening)):
+        if stray := sorted(set(given).difference(boundaries)):
+            raise FesdError(wrt, f"the {name} {stray} are not element boundaries", "discretise with these points in the set")
     elements = []
     for n, (left, right) in enumerate(zip(boundaries, boundaries[1:]), start=1):
         inside = _between(points, left, right)
@@ -138,7 +152,7 @@ def read_grid(wrt: ContinuousSet, stages: list[float]) -> Grid:
                 f"its labels collide at pyomo.dae's resolution of 1e-6",
                 "let fesd.finite_elements discretise it, or scale time, e.g. write the model in milliseconds",
             )
-        elements.append(Element(n, bisect_right(stages, left), left in opening, left, right, labels))
+        elements.append(Element(n, bisect_right(opening, left), left in opening, left in changing, left, right, labels))
     weights = interpolation_weights(tau, [1 / (k + 1) for k in range(len(tau))])
     return Grid(tuple(elements), tau, tuple(map(float, weights)))
 
@@ -147,18 +161,18 @@ def _between(points, left, right):
     return points[bisect_right(points, left) : bisect_right(points, right) - 1]
 
 
-def share_elements(wrt: ContinuousSet, nfe: int | list[int]) -> list[int]:
+def share_elements(wrt: ContinuousSet, nfe: int | list[int], fixed_points: Iterable[float] = ()) -> list[int]:
     """Return the number of elements between the points of ``wrt``: equal for each control stage, or as ``nfe`` lists them.
 
-    Between the breakpoints of signals, the elements of a control stage are shared by length, at least two for each interval; so
-    they may be more than ``nfe``.
+    Between the breakpoints of signals, and ``fixed_points``, the elements of a control stage are shared by length, at least two for
+    each interval; so they may be more than ``nfe``.
 
     Raises
     ------
     FesdError
         if they cannot be shared equally, or if the list does not fit
     """
-    points, inner = list(wrt), signal_breakpoints(wrt)
+    points, inner = with_points(wrt, fixed_points), signal_breakpoints(wrt).union(fixed_points)
     if isinstance(nfe, list) and len(nfe) == len(points) - 1:
         return nfe
     stages = [p for p in points if p not in inner]
@@ -208,7 +222,12 @@ def finest_resolution(wrt: ContinuousSet) -> float:
     return 16 * sys.float_info.epsilon * max(abs(wrt.first()), abs(wrt.last()))
 
 
-def label_decimals(wrt: ContinuousSet, shares: list[int], ncp: int) -> int:
+def with_points(wrt: ContinuousSet, fixed_points: Iterable[float]) -> list[float]:
+    """Return the points of ``wrt`` and ``fixed_points`` in order, each once."""
+    return sorted({*wrt, *fixed_points})
+
+
+def label_decimals(wrt: ContinuousSet, shares: list[int], ncp: int, fixed_points: Iterable[float] = ()) -> int:
     """Return the number of decimals to which labels are rounded: 6, or more where elements are short.
 
     Raises
@@ -216,7 +235,7 @@ def label_decimals(wrt: ContinuousSet, shares: list[int], ncp: int) -> int:
     FesdError
         for elements whose labels floating-point numbers do not tell apart
     """
-    points = list(wrt)
+    points = with_points(wrt, fixed_points)
     shortest = min((b - a) / n for a, b, n in zip(points, points[1:], shares))
     # the first of ncp Radau or Legendre points lies about 1/(ncp + 1)**2 from the boundary
     distance = shortest / (ncp + 1) ** 2

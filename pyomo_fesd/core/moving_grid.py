@@ -41,7 +41,7 @@ class MovingGrid(AutoSlots.Mixin):
     block : Block
         the generated block that holds the lengths, pairs and equations below
     grid : Grid
-        the nominal elements, hbar_n, and the scheme
+        the nominal elements, hbar_n, with the stages between boundaries that keep their time, and the scheme
     r : Var over 1..N
         length multipliers r_n
     sigma : Expression over 1..N, or None

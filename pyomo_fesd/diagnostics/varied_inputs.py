@@ -65,7 +65,7 @@ def _fixed(model, wrt):
 
 def _stages(moving: MovingGrid) -> Iterator[tuple[float, ...]]:
     """The labels of each control stage, without its beginning."""
-    for elements in moving.grid.stages.values():
+    for elements in moving.grid.control_stages:
         yield tuple(label for e in elements for label in e.own_labels)
 
 

@@ -5,7 +5,7 @@ The transformation reads the switched systems that other transformations recorde
 
 - ``transformation`` calls all others, in the order of its ``_apply_to``; ``options`` declares its keywords
 - ``expansion``, ``collocation``: pyomo.dae's discretisation, also of Disjuncts
-- ``lengths``, ``free_time``, ``quadrature``, ``controls``: time on moving elements
+- ``lengths``, ``fixed_points``, ``free_time``, ``quadrature``, ``controls``: time on moving elements
 - ``time_complementarities``, ``mixed_complementarity``, ``continuity``, ``algebraic_graph``: conditions and their continuity
 - ``cross_complementarity``, ``state_jumps``, ``hysteresis``, ``right_limits``, ``mode_limits``, ``relations``: the laws of
   switching

@@ -32,7 +32,7 @@ def add_coincidences(moving: MovingGrid) -> None:
         later = None if begins[-1] is after else moving.r[after.n]
         earlier = None if ends[0] is before else moving.r[before.n]
         # what jumps between control stages may switch there without an element to spare
-        left_out = jumping if after.opens_stage and None in (later, earlier) else ()
+        left_out = jumping if after.inputs_change and None in (later, earlier) else ()
         if several or after.opens_stage:
             found.append(Coincidence(tuple(_changes(places, before, families, left_out)), later, earlier, after.opens_stage))
 

@@ -52,7 +52,7 @@ def _control_stages(grid, wrt):
     """Control stage of every label but the first, 1...; breakpoints of signals do not divide them."""
     inner, found, number = signal_breakpoints(wrt), {}, 0
     for element in grid.elements:
-        number += element.opens_stage and element.left not in inner
+        number += element.inputs_change and element.left not in inner
         found.update(dict.fromkeys(element.own_labels, number))
     return found
 

@@ -37,7 +37,7 @@ def warn_explicit_time(moving: MovingGrid, expressions: Iterable[tuple]) -> None
     With every variable at one value, all points of a constraint without explicit time give the same number.  Control stages
     may have data of their own, so points are compared within a control stage.
     """
-    stage = {t: e.stage for e in moving.grid.elements for t in e.own_labels}
+    stage = {t: k for k, elements in enumerate(moving.grid.control_stages) for e in elements for t in e.own_labels}
     for name in dict.fromkeys(name for name, by_time in expressions if _depends_on_time(by_time, stage)):
         logger.warning(
             "%s: its numbers depend on the time label (a Param over time, or t itself in a rule). Labels are not physical "

@@ -50,7 +50,7 @@ def add_lengths(moving: MovingGrid, gamma: float, factors: list | None = None) -
     block.r = moving.r = Var(block.element, bounds=(LEAST, None), initialize=1)
     homotopy_hints(block).guide_bounds[block.r] = (1 - gamma, 1 + gamma)
     if factors is not None:
-        block.sigma = moving.sigma = Expression(block.element, initialize={e.n: factors[e.stage - 1] for e in grid.elements})
+        block.sigma = moving.sigma = Expression(block.element, initialize=dict(_by_element(grid, factors)))
 
     @block.Constraint(block.stage)
     def stage_length(b, stage):
@@ -61,6 +61,11 @@ def add_lengths(moving: MovingGrid, gamma: float, factors: list | None = None) -
         # in mean lengths: tolerances do not know the unit of time
         mean = (elements[-1].right - elements[0].left) / len(elements)
         return sum(e.length / mean * b.r[e.n] for e in elements) == len(elements)
+
+
+def _by_element(grid, factors):
+    for factor, elements in zip(factors, grid.control_stages):
+        yield from ((e.n, factor) for e in elements)
 
 
 def discretisation_equations(model: Block, wrt: ContinuousSet) -> Iterator[tuple]:

@@ -41,7 +41,7 @@ def with_mode_limits(
         controls that are held on each control stage
     """
     elements = moving.grid.elements
-    opening = [e for e in elements[1:] if e.opens_stage]
+    opening = [e for e in elements[1:] if e.inputs_change]
     within = {id(c): elements if _jumps_with_modes(c, continuity) else opening * any(c.jumps_with_controls) for c in conditions}
     if not any(within.values()):
         return conditions

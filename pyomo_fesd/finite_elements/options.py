@@ -113,6 +113,12 @@ OPTIONS = {
         "a Var: length of the horizon in time of the plant, in which the model is written",
     ),
     'stage_lengths': (None, _lengths, "the same for each control stage: one Var for each"),
+    'fixed_points': (
+        [],
+        _labels,
+        "labels inside control stages that are element boundaries and keep their time, as control-stage boundaries do, but inputs "
+        "do not change there; elements on their two sides may differ in length. A list ``nfe`` has one number for each interval",
+    ),
     'stages': (None, _labels, "labels of inner control-stage boundaries, only for a model that is discretised already"),
 }
 

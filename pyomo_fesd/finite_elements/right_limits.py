@@ -69,7 +69,7 @@ class RightLimits:
         found = {}
         for before, element in zip(self._moving.grid.elements, self._moving.grid.elements[1:]):
             pair = condition.sides.get(before.right)
-            if pair is not None and not (element.opens_stage and any(condition.jumps_with_controls)):
+            if pair is not None and not (element.inputs_change and any(condition.jumps_with_controls)):
                 swap = self._swap(before, variables_in_sides(pair))
                 found |= {element.n: Pair(*(exchanged(side, swap) for side in pair))} if swap else {}
         return replace(condition, starts=found)
@@ -82,8 +82,8 @@ class RightLimits:
         functions : dict label -> expression
         """
         left = functions[before.right]
-        right = self._of_next_stage(before, functions[element.points[0]]) if element.opens_stage else left
-        same = not element.opens_stage or self._same(left, right)
+        right = self._of_next_stage(before, functions[element.points[0]]) if element.inputs_change else left
+        same = not element.inputs_change or self._same(left, right)
         right = left if same else right
         swap = self._swap(before, variables_in(right)) if self._states else {}
         return None if same and not swap else exchanged(right, swap)

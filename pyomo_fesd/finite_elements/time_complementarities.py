@@ -79,7 +79,7 @@ class TimeComplementarity:
         values = [self.sides[t][side] for t in self.points(element)]
         if not self.continuous[side]:
             return values
-        if not (element.opens_stage and self.jumps_with_controls[side]) and element.left in self.sides:
+        if not (element.inputs_change and self.jumps_with_controls[side]) and element.left in self.sides:
             values.append(self.starts.get(element.n, self.sides[element.left])[side])
         if element.right not in element.points and element.right in self.sides:
             values.append(self.sides[element.right][side])

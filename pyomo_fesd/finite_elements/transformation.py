@@ -40,6 +40,7 @@ from pyomo_fesd.finite_elements.cross_complementarity import add_cross_complemen
 from pyomo_fesd.finite_elements.equilibration import add_equilibration
 from pyomo_fesd.finite_elements.expansion import discretise
 from pyomo_fesd.finite_elements.explicit_time import expressions_over_time, warn_explicit_time
+from pyomo_fesd.finite_elements.fixed_points import add_fixed_points, check_fixed_points
 from pyomo_fesd.finite_elements.free_time import check_free_time, factors
 from pyomo_fesd.finite_elements.friction_impulses import add_friction_impulses
 from pyomo_fesd.finite_elements.given_inputs import complete_params
@@ -101,7 +102,8 @@ class FiniteElements(Transformation):
     two bounds on one side becomes two pairs.
 
     The points that the ContinuousSet has before are boundaries of control stages: they keep their physical time, and each
-    control stage gets the same number of elements, unless ``nfe`` lists others.  The final time, or the length of each control
+    control stage gets the same number of elements, unless ``nfe`` lists others.  So do ``fixed_points``, at which inputs do not
+    change.  The final time, or the length of each control
     stage, may be a variable.  On a model that is discretised already, the present grid is made movable.
 
     Raises
@@ -169,13 +171,14 @@ def _check_keywords(instance, wrt, config):
             "stages= was given for a set that is not discretised yet",
             "put these boundaries into the ContinuousSet",
         )
-    label_decimals(wrt, share_elements(wrt, config.nfe), config.ncp)
+    check_fixed_points(config.fixed_points, wrt)
+    label_decimals(wrt, share_elements(wrt, config.nfe, config.fixed_points), config.ncp, config.fixed_points)
 
 
 def _add_grid(instance, wrt, config):
     """Discretise, continue ``fesd.dcs`` at the new times, and return the record of the grid with its lengths."""
     stages = _discretise(instance, wrt, config)
-    grid, model = read_grid(wrt, stages), instance.model()
+    grid, model = read_grid(wrt, stages, config.fixed_points), instance.model()
     fix_given(config.piecewise_constant, grid, wrt)
     write_at_further_times(model, wrt)
     check_orders(model, wrt)
@@ -193,7 +196,9 @@ def _discretise(instance, wrt, config):
         return sorted({wrt.first(), wrt.last(), *(config.stages or ())})
     stages = list(wrt)
     given = [*config.piecewise_constant, *signals(wrt)]
-    discretise(instance, wrt, share_elements(wrt, config.nfe), config.ncp, config.scheme, given)
+    shares = share_elements(wrt, config.nfe, config.fixed_points)
+    add_fixed_points(config.fixed_points, wrt)
+    discretise(instance, wrt, shares, config.ncp, config.scheme, given)
     complete_params(instance, wrt, given)
     return stages
 
@@ -243,7 +248,7 @@ def _read_continuity(instance, moving, switching, config):
     labels = {inner_label(by_time, moving.wrt) for by_time in conditions}
     found = (condition for by_time in conditions for condition in by_time.values())
     written = not all(isinstance(c, ComplementarityData) and is_generated(c) for c in found)
-    trace = written or (bool(conditions) and (len(grid.stages) > 1 or not grid.right_is_collocated))
+    trace = written or (bool(conditions) and (len(grid.control_stages) > 1 or not grid.right_is_collocated))
     times = TimeIndex(moving.wrt)
     return read_continuity(instance.model(), times, labels, _held(config, moving.wrt), config.continuous, trace)
 

@@ -8,18 +8,28 @@ from pyomo.opt import SolverResults
 
 from pyomo_fesd.refinement.dense_output import RoundSolution
 from pyomo_fesd.refinement.element_density import densities, effective_number, next_numbers
-from pyomo_fesd.refinement.error_estimate import Difference, difference, error, error_without_difference, observed_order
+from pyomo_fesd.refinement.error_estimate import (
+    Difference,
+    difference,
+    error,
+    error_by_scales,
+    error_without_difference,
+    observed_order,
+)
+from pyomo_fesd.refinement.mesh import Mesh
 
 #: Growth after the first round, when no error is known.
 DOUBLE = 2.0
+#: Where local scales on a mesh with fixed points promise an error so many times below the tolerance, the next round grows least.
+SURE = 10.0
 UNKNOWN = Difference(nan, nan, nan, nan)
 
 
 @dataclass(frozen=True)
 class Round:
-    """Numbers of elements of the control stages, the solution with them, all values, and the results of the solver, if any."""
+    """The mesh, the solution on it, all values, and the results of the solver, if any."""
 
-    numbers: list[int]
+    mesh: Mesh
     solution: RoundSolution
     values: list[tuple] = ()
     results: SolverResults | None = None
@@ -39,15 +49,14 @@ def comparable(a: Round, b: Round) -> bool:
     return difference(a.solution, b.solution) is not None
 
 
-def assess(rounds: Sequence[Round], order: int, tolerance: float, most: Sequence[int]) -> Assessment:
-    """Assess rounds of which each can be compared with the one before, for a scheme of this ``order``.
-
-    The next numbers of elements are at most ``most`` in each control stage.
-    """
-    solutions, numbers = [r.solution for r in rounds[-3:]], rounds[-1].numbers
+def assess(rounds: Sequence[Round], order: int, tolerance: float) -> Assessment:
+    """Assess rounds of which each can be compared with the one before, for a scheme of this ``order``."""
+    solutions, mesh = [r.solution for r in rounds[-3:]], rounds[-1].mesh
+    numbers, most = mesh.numbers, mesh.most(len(solutions[-1].grid.tau))
     pieces = densities(solutions[-1], order)
     if len(rounds) == 1:
-        return Assessment(UNKNOWN, nan, next_numbers(numbers, pieces, order, DOUBLE, most))
+        fine = mesh.points and SURE * error_by_scales(solutions[-1], solutions[-1].pieces, order) <= tolerance
+        return Assessment(UNKNOWN, nan, next_numbers(numbers, pieces, order, 1.0 if fine else DOUBLE, most))
     found = [difference(a, b) for a, b in zip(solutions, solutions[1:])]
     sizes = [effective_number(s, pieces, order) for s in solutions]
     observed = observed_order(sizes, [d.largest for d in found], order) if len(solutions) == 3 else nan

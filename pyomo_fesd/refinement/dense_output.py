@@ -1,7 +1,7 @@
 """The solution of one round as numbers, which outlive its grid.
 
-A *piece* is a sequence of elements of one control stage with the same active set: between two switches, jumps or boundaries of
-control stages.  Inside it the solution is smooth; eta of step equilibration (theory, eq. 12) tells where it ends.
+A *piece* is a sequence of elements of one stage with the same active set: between two switches, jumps, or boundaries that keep
+their time.  Inside it the solution is smooth; eta of step equilibration (theory, eq. 12) tells where it ends.
 """
 
 from __future__ import annotations
@@ -85,6 +85,22 @@ class RoundSolution:
     def begin(self, name: str, element) -> float:
         """Return the value of a state where an element begins."""
         return self.after.get(element.n, {}).get(name, self.values[name].get(element.left, np.nan))
+
+    def at_boundaries(self, labels: Sequence[float]) -> np.ndarray:
+        """Return the physical times of labels that keep theirs."""
+        return np.interp(labels, *self._boundaries())
+
+    def label(self, time: float) -> float:
+        """Return the label that a boundary at a physical time has if it keeps this time."""
+        return float(np.interp(time, *reversed(self._boundaries())))
+
+    def stage_labels(self) -> list[float]:
+        """Return the labels of the boundaries that keep their time."""
+        return [self.grid.elements[0].left, *(elements[-1].right for elements in self.grid.stages.values())]
+
+    def _boundaries(self):
+        labels = self.stage_labels()
+        return labels, [self.time[t] for t in labels]
 
     def at_nodes(self, name: str, piece: Piece) -> np.ndarray:
         """Return a state at the nodes of a piece."""

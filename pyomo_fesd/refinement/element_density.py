@@ -20,19 +20,16 @@ from dataclasses import dataclass
 from math import factorial
 
 import numpy as np
-from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import finest_resolution, interpolation_weights
+from pyomo_fesd.core import interpolation_weights
 from pyomo_fesd.refinement.dense_output import Piece, RoundSolution
 
 #: Least and largest growth from one round to the next: of the effective number, of the number.
 GROWTH = (1.25, 4.0)
-#: Least density of a piece, as a part of the largest.
-LEAST_DENSITY = 0.02
+#: Least local scale of a piece, as a part of the largest: smaller ones are round-off, or chance.
+LEAST_SCALE = 0.02
 #: Margin of the growth, as numbers are whole and switches move.
 MARGIN = 1.1
-#: Least distance of two labels, as a part of the horizon.
-LEAST = 2e-6
 #: Elements that one step of the search adds to a control stage, as a part of its elements.
 STEP = 0.05
 
@@ -48,11 +45,12 @@ class DensePiece:
 
 def densities(solution: RoundSolution, order: int) -> list[DensePiece]:
     """Return the pieces of a solution with their densities."""
-    lengths = [p.length for p in solution.pieces]
-    found = [float(np.mean((scales(solution, p) / np.diff(p.nodes)) ** (order + 1)) ** (1 / (order + 1))) for p in solution.pieces]
-    least = LEAST_DENSITY * max(found) if max(found) > 0 else 1 / sum(lengths)
+    mean = np.array([np.mean(scales(solution, p) ** (order + 1)) ** (1 / (order + 1)) for p in solution.pieces])
+    mean = np.maximum(mean, LEAST_SCALE * mean.max()) if mean.max() > 0 else np.ones(len(mean))
+    lengths = np.array([p.length for p in solution.pieces])
     positions = {stage: k for k, stage in enumerate(solution.grid.stages)}
-    return [DensePiece(positions[p.stage], length, max(D, least)) for p, length, D in zip(solution.pieces, lengths, found)]
+    found = mean * [len(p.elements) for p in solution.pieces] / lengths
+    return [DensePiece(positions[p.stage], float(length), float(D)) for p, length, D in zip(solution.pieces, lengths, found)]
 
 
 def scales(solution: RoundSolution, piece: Piece) -> np.ndarray:
@@ -103,9 +101,3 @@ def next_numbers(numbers: Sequence[int], pieces: Sequence[DensePiece], order: in
         found[stage] = min(full[stage], found[stage] + max(1, int(STEP * found[stage])))
         M = expected(found, pieces, order)
     return [int(n) for n in found]
-
-
-def most_numbers(wrt: ContinuousSet, ncp: int) -> list[int]:
-    """Return the largest numbers of elements: of a sensible length, with labels that can be told apart."""
-    points, least = list(wrt), max(finest_resolution(wrt), LEAST * (wrt.last() - wrt.first()))
-    return [int((b - a) / (least * (ncp + 1) ** 2)) for a, b in zip(points, points[1:])]

@@ -23,7 +23,7 @@ Does not apply: to errors that no grid shows, such as a local minimum instead of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import astuple, dataclass
 from math import factorial, inf
 
@@ -31,7 +31,8 @@ import numpy as np
 from scipy.interpolate import KroghInterpolator
 from scipy.optimize import brentq
 
-from pyomo_fesd.refinement.dense_output import RoundSolution
+from pyomo_fesd.core import Grid
+from pyomo_fesd.refinement.dense_output import Piece, RoundSolution
 from pyomo_fesd.refinement.element_density import scales
 
 #: Safety factor before the asymptotic range.
@@ -144,9 +145,17 @@ def error_without_difference(coarse: RoundSolution, fine: RoundSolution, order: 
     """Return the error of pieces that have the same elements in both rounds, by the local scales alone."""
     pairs = zip(coarse.pieces, fine.pieces)
     same = [f for c, f in pairs if np.max(np.diff(f.nodes)) > SAME * np.max(np.diff(c.nodes))]
-    K = len(fine.grid.tau)
-    if fine.grid.right_is_collocated:
-        constant = factorial(K) * factorial(K - 1) / (factorial(2 * K - 1) * factorial(2 * K))
-    else:
-        constant = factorial(K) ** 2 / (factorial(2 * K) * factorial(2 * K + 1))
-    return constant * sum(float(np.sum(scales(fine, p) ** (order + 1))) for p in same)
+    return error_by_scales(fine, same, order)
+
+
+def error_by_scales(solution: RoundSolution, pieces: Iterable[Piece], order: int) -> float:
+    """Return the error of some pieces by their local scales alone."""
+    return error_constant(solution.grid) * sum(float(np.sum(scales(solution, p) ** (order + 1))) for p in pieces)
+
+
+def error_constant(grid: Grid) -> float:
+    """Return c_K of the scheme."""
+    K = len(grid.tau)
+    if grid.right_is_collocated:
+        return factorial(K) * factorial(K - 1) / (factorial(2 * K - 1) * factorial(2 * K))
+    return factorial(K) ** 2 / (factorial(2 * K) * factorial(2 * K + 1))

@@ -11,20 +11,21 @@ Does not apply: to errors that no grid shows, such as a local minimum instead of
 import logging
 import time
 from collections.abc import Sequence
-from math import ceil, nan
+from math import ceil, inf, isnan, nan
 from operator import ge
 
 import numpy as np
 from pyomo.core import Block
 from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import find_continuous_set, interruptible, share_elements
+from pyomo_fesd.core import find_continuous_set, interruptible
 from pyomo_fesd.diagnostics import diagnose, missed_crossings
 from pyomo_fesd.refinement.assessment import Round, assess, comparable
 from pyomo_fesd.refinement.checks import check, read_nfe, read_options, read_quantities
 from pyomo_fesd.refinement.dense_output import read_solution
-from pyomo_fesd.refinement.element_density import most_numbers
+from pyomo_fesd.refinement.grading import graded
 from pyomo_fesd.refinement.kept_values import read_values, write_values
+from pyomo_fesd.refinement.mesh import first_mesh
 from pyomo_fesd.refinement.refinement_result import ERRORS, Refinement, RoundTable
 from pyomo_fesd.refinement.round_solver import RoundSolver
 from pyomo_fesd.refinement.trial_round import trial_round
@@ -34,10 +35,13 @@ logger = logging.getLogger('pyomo_fesd')
 
 #: Elements of the first round by default: in total, and at least in each control stage.
 FIRST, FIRST_EACH = 8, 2
+#: Rounds that new fixed points leave: with three, the order of the error is observed.
+COMPARED = 3
 #: Tolerance of the equations, as a part of that of the solution, and its limits by what Ipopt can do.
 EXACT, EXACT_LIMITS = 1e-3, (1e-12, 1e-9)
 #: Notes of rounds that cannot be compared with the one before, or with any.
 OTHER_ORDER, OVERLOOKED = 'modes in another order than before', 'a switch is overlooked between two collocation points'
+POINTS = 'new fixed points: %s'
 NOT_REACHED = (
     "refine: the tolerance %.1e is not reached in %d rounds; the estimated error is %.1e. Take more rounds (max_rounds), "
     "more points (ncp), or more elements in the first round (nfe)."
@@ -105,76 +109,91 @@ def refine(
     quantities = read_quantities(quantities)
     keywords, options = read_options(options | {'ncp': ncp, 'scheme': scheme})
     stages = len(wrt) - 1
-    numbers = share_elements(wrt, stages * max(FIRST_EACH, ceil(FIRST / stages)) if nfe is None else read_nfe(nfe))
+    number = stages * max(FIRST_EACH, ceil(FIRST / stages)) if nfe is None else read_nfe(nfe)
+    mesh = first_mesh(wrt, number, keywords.pop('fixed_points', ()))
     options = {'branch_tol': float(np.clip(EXACT * tolerance, *EXACT_LIMITS))} | options
     solver = RoundSolver(model, wrt, keywords, options)
     table = RoundTable({'objective': not solver.optimise, 'quantities': not quantities}, tee)
-    return _Rounds(model, wrt, tolerance, solver, quantities, table).run(numbers, max_rounds)
+    return _Rounds(model, wrt, tolerance, solver, quantities, table, max_rounds).run(mesh)
 
 
 class _Rounds:
     """The rounds of one call."""
 
-    def __init__(self, model, wrt, tolerance, solver, quantities, table):
+    def __init__(self, model, wrt, tolerance, solver, quantities, table, max_rounds):
         self._model, self._wrt, self._tolerance = model, wrt, tolerance
-        self._solver, self._quantities, self._table = solver, quantities, table
-        self._most = most_numbers(wrt, solver.ncp)
+        self._solver, self._quantities, self._table, self._max_rounds = solver, quantities, table, max_rounds
         # rounds of which each can be compared with the one before; the last one with a solution, and its error
         self._rounds, self._best, self._error = [], None, nan
 
-    def run(self, numbers, max_rounds):
+    def run(self, mesh):
         """Solve rounds until the tolerance is reached, or no round can improve."""
         last = False
         while not last:
             with trial_round(self._model, self._wrt) as trial:
                 started = time.perf_counter()
-                self._solver.patient = len(self._table) + 1 == max_rounds or all(map(ge, numbers, self._most))
-                failure = self._solve(numbers)
-                row, following = self._assess(numbers) if failure is None else self._fail(numbers, 'no solution: ' + failure.cause)
+                most = mesh.most(self._solver.ncp)
+                self._solver.patient = len(self._table) + 1 == self._max_rounds or all(map(ge, mesh.numbers, most))
+                failure = self._solve(mesh)
+                row, following = self._assess(mesh) if failure is None else self._fail(mesh, 'no solution: ' + failure.cause)
                 seconds = time.perf_counter() - started
                 self._table.add(row | {'seconds': seconds})
                 reached = failure is None and self._error <= self._tolerance
                 # the next round hardly takes less than this one
                 out_of_time = self._solver.deadline.within(seconds)
-                last = reached or len(self._table) == max_rounds or following == numbers or out_of_time
+                last = reached or len(self._table) == self._max_rounds or following == mesh or out_of_time
                 if last and failure is None:
                     trial.keep()
-            numbers = following
+            mesh = following
         if failure is not None:
             self._return_to_best(failure)
         if not reached:
             logger.warning(TIME_IS_UP if out_of_time else NOT_REACHED, self._tolerance, len(self._table), self._error)
-        return Refinement(reached, self._error, self._table.frame, self._solver.results)
+        return Refinement(reached, self._error, self._best.mesh.points, self._table.frame, self._solver.results)
 
-    def _solve(self, numbers):
-        return self._solver.solve(numbers, None if self._best is None else self._best.solution)
+    def _solve(self, mesh):
+        return self._solver.solve(mesh, None if self._best is None else self._best.solution)
 
-    def _fail(self, numbers, note):
-        """A row of the table, and the next numbers of elements, after a round without a comparable solution."""
+    def _fail(self, mesh, note):
+        """A row of the table, and the next mesh, after a round without a comparable solution."""
         self._rounds = []
-        row = {'nfe': numbers, 'elements': sum(numbers), 'note': note}
-        return row, [min(2 * n, most) for n, most in zip(numbers, self._most)]
+        row = {'nfe': mesh.numbers, 'elements': sum(mesh.numbers), 'note': note}
+        return row, mesh.with_numbers([min(2 * n, most) for n, most in zip(mesh.numbers, mesh.most(self._solver.ncp))])
 
-    def _assess(self, numbers):
+    def _assess(self, mesh):
         """The same for a round with a solution."""
         solution = read_solution(self._model, self._wrt, self._quantities)
-        self._best, self._error = Round(numbers, solution, read_values(self._model), self._solver.results), nan
+        new = [] if self._best is None else [t for t in mesh.points if t not in self._best.mesh.points]
+        self._best, self._error = Round(mesh, solution, read_values(self._model), self._solver.results), nan
         if any(True for _ in missed_crossings(self._model, self._wrt, switching_functions(self._model, self._wrt))):
-            return self._fail(numbers, OVERLOOKED)
+            return self._fail(mesh, OVERLOOKED)
         lost = bool(self._rounds) and not comparable(self._rounds[-1], self._best)
         self._rounds = [self._best] if lost else [*self._rounds, self._best]
-        found = assess(self._rounds, self._solver.order, self._tolerance, self._most)
+        found = assess(self._rounds, self._solver.order, self._tolerance)
         self._error = float(found.error.largest)
-        row = {'nfe': numbers, 'elements': sum(numbers), 'order': found.order, 'pairs': self._best.solution.pairs}
+        row = {'nfe': mesh.numbers, 'elements': sum(mesh.numbers), 'order': found.order, 'pairs': self._best.solution.pairs}
         row |= {name: getattr(found.error, name) for name in ERRORS}
-        return row | {'note': OTHER_ORDER if lost else ''}, found.following
+        row['note'] = OTHER_ORDER if lost else POINTS % ', '.join(f'{t:g}' for t in new) if new else ''
+        return row, self._graded(mesh, solution, found.order) or mesh.with_numbers(found.following)
+
+    def _graded(self, mesh, solution, observed):
+        """The next mesh if it gets fixed points, and enough rounds are left; else None."""
+        if len(self._table) + 1 + COMPARED > self._max_rounds:
+            return None
+        # two rounds alone overestimate the error
+        estimate = 0.0 if isnan(observed) or self._error == inf else self._error
+        following = graded(mesh, solution, self._solver.order, self._tolerance, estimate)
+        if following is not None:
+            # solutions on meshes with other points are not compared
+            self._rounds = []
+        return following
 
     def _return_to_best(self, failure):
         """Return to the last round with a solution, as the last round has none."""
         if self._best is None:
             raise failure
         with trial_round(self._model, self._wrt) as trial:
-            self._solver.discretise(self._best.numbers)
+            self._solver.discretise(self._best.mesh)
             write_values(self._model, self._best.values)
             diagnose(self._model)
             trial.keep()

@@ -26,6 +26,8 @@ class Refinement:
         whether the estimated error is below the tolerance
     error : float
         the estimate, nan if there is none
+    fixed_points : tuple of float
+        labels at which the last grid has ``fixed_points``, placed by ``refine`` or given
     table : pandas.DataFrame
         a row for each round: ``nfe`` (elements of each control stage), estimated errors of ``states``, ``switches`` and
         ``objective`` (or ``quantities``), the observed ``order``, ``pairs``, ``seconds``, and a ``note``
@@ -35,6 +37,7 @@ class Refinement:
 
     reached: bool
     error: float
+    fixed_points: tuple[float, ...]
     table: pd.DataFrame
     results: SolverResults | None
 

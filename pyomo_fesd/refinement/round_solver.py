@@ -10,6 +10,7 @@ from pyomo_fesd.mpcc import Deadline
 from pyomo_fesd.refinement.checks import degree_of_freedom, objectives
 from pyomo_fesd.refinement.dense_output import RoundSolution
 from pyomo_fesd.refinement.interpolated_start import start_from
+from pyomo_fesd.refinement.mesh import Mesh
 from pyomo_fesd.simulation import TooFewElements, simulate
 
 #: Ipopt iterations of a round that a finer one follows: on a grid that is too coarse, searches for a feasible point do not end.
@@ -41,14 +42,15 @@ class RoundSolver:
         self.optimise = any(True for _ in objectives(model))
         self.results, self.patient = None, False
 
-    def solve(self, numbers: list[int], before: RoundSolution | None) -> FesdError | None:
-        """Solve with these numbers of elements, starting from ``before``; returns the error if there is no solution, else None."""
-        self.discretise(numbers)
-        return self._optimise(numbers, before) if self.optimise else self._simulate()
+    def solve(self, mesh: Mesh, before: RoundSolution | None) -> FesdError | None:
+        """Solve on a mesh, starting from ``before``; returns the error if there is no solution, else None."""
+        self.discretise(mesh)
+        return self._optimise(mesh.numbers, before) if self.optimise else self._simulate()
 
-    def discretise(self, numbers: list[int]) -> None:
-        """Put these numbers of elements on the control stages."""
-        TransformationFactory('fesd.finite_elements').apply_to(self._model, wrt=self._wrt, nfe=numbers, **self._keywords)
+    def discretise(self, mesh: Mesh) -> None:
+        """Put a mesh on the model."""
+        grid = {'nfe': mesh.numbers, 'fixed_points': mesh.points}
+        TransformationFactory('fesd.finite_elements').apply_to(self._model, wrt=self._wrt, **grid, **self._keywords)
 
     def _simulate(self):
         held = moving_grids(self._model)[self._wrt].held
