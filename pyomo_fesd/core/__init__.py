@@ -57,6 +57,7 @@ from pyomo_fesd.core.interpolation import interpolation_weights
 from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible
 from pyomo_fesd.core.keywords import check_keywords, read_keywords
 from pyomo_fesd.core.moving_grid import MovingGrid, Split, add_moving_grid, moving_grids
+from pyomo_fesd.core.parts import Part
 from pyomo_fesd.core.phase import phase
 from pyomo_fesd.core.positive_part import add_positive_part, declare_positive_part
 from pyomo_fesd.core.private_data import records_below, remember_records

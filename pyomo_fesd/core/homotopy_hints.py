@@ -100,12 +100,16 @@ class Coincidence:
         bound; None where there is no such place
     fixed : bool
         whether they also fall together with something that does not move, so that one change alone matters too
+    before, after : VarData or None
+        the extents of the places on both sides, whether changes can move past them or not
     """
 
     changes: tuple[Change, ...]
     later: VarData | None
     earlier: VarData | None
     fixed: bool = False
+    before: VarData | None = None
+    after: VarData | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,6 +252,7 @@ class HomotopyHints(AutoSlots.Mixin):
     neighbour_branches : list of NeighbourBranch
     coincidences : list of Coincidence
     arrivals : list of Arrival
+    chains : list of tuple of Part
     followers : list of Follower
     fillings : list of Filling
     alike : list of tuples of VarData
@@ -261,6 +266,7 @@ class HomotopyHints(AutoSlots.Mixin):
         'neighbour_branches',
         'coincidences',
         'arrivals',
+        'chains',
         'followers',
         'fillings',
         'alike',
@@ -273,6 +279,7 @@ class HomotopyHints(AutoSlots.Mixin):
         self.neighbour_branches = []
         self.coincidences = []
         self.arrivals = []
+        self.chains = []
         self.alike = []
         self.followers = []
         self.fillings = []
@@ -325,6 +332,7 @@ def all_hints(model: Block) -> HomotopyHints:
         total.neighbour_branches += hints.neighbour_branches
         total.coincidences += hints.coincidences
         total.arrivals += hints.arrivals
+        total.chains += hints.chains
         total.alike += hints.alike
         total.followers += hints.followers
         total.fillings += hints.fillings

@@ -34,7 +34,9 @@ def add_coincidences(moving: MovingGrid) -> None:
         # what jumps between control stages may switch there without an element to spare
         left_out = jumping if after.inputs_change and None in (later, earlier) else ()
         if several or after.opens_stage:
-            found.append(Coincidence(tuple(_changes(places, before, families, left_out)), later, earlier, after.opens_stage))
+            changes = tuple(_changes(places, before, families, left_out))
+            beside = moving.r[before.n], moving.r[after.n]
+            found.append(Coincidence(changes, later, earlier, after.opens_stage, *beside))
 
 
 def _jumping_between_stages(moving):

@@ -32,6 +32,7 @@ from pyomo_fesd.core import (
     write_at_further_times,
 )
 from pyomo_fesd.finite_elements.arrivals import add_arrivals
+from pyomo_fesd.finite_elements.chain_of_elements import add_chain
 from pyomo_fesd.finite_elements.coincidences import add_coincidences
 from pyomo_fesd.finite_elements.contacts import read_contacts, with_departures
 from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
@@ -288,3 +289,4 @@ def _add_switching(moving, switching, complementarities, continuity, config):
     add_neighbour_branches(moving)
     add_coincidences(moving)
     add_arrivals(moving)
+    add_chain(moving)

@@ -31,12 +31,15 @@ class Entered:
         values to start from
     either : int array
         pairs of which any side may be zero
+    between : bool
+        whether one change has come in on both sides of an end between two rows
     """
 
     extents: np.ndarray
     zero: np.ndarray
     start: np.ndarray
     either: np.ndarray
+    between: bool = False
 
 
 @dataclass(frozen=True)
@@ -141,7 +144,8 @@ def _entered(rows, sequence, sets, w):
         zero[change.pairs] = change.sides
         either.append(change.either)
     extents = [place.extent for row in rows for place in row[: len(sequence)]]
-    return None if None in extents else Entered(np.array(extents), zero, start, np.concatenate(either))
+    between = len(rows) == 2 and len(sequence) == 1
+    return None if None in extents else Entered(np.array(extents), zero, start, np.concatenate(either), between)
 
 
 def _moved_inwards(row, zero, start, undecided):

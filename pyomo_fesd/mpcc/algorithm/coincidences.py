@@ -8,22 +8,38 @@ settled.  A point with an order that is neither is not certified.  Changes at an
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.arrivals import NONE, Entered, branches
-from pyomo_fesd.mpcc.algorithm.branches import AS_GOOD, AT_BOUND, PROGRESS, SECOND
+from pyomo_fesd.mpcc.algorithm.branches import AS_GOOD, PROGRESS, SECOND
+from pyomo_fesd.mpcc.algorithm.insertions import OrdersByInsertion
 from pyomo_fesd.mpcc.algorithm.state import Point
 from pyomo_fesd.mpcc.algorithm.subsolves import INFEASIBLE
 from pyomo_fesd.mpcc.nlp import NlpResult
-from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets, Stationarity
+from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets, Stationarity, Verdict
 
 #: Iterations enough to show that there is no branch of an order.
 PATIENCE = 300
-#: Outcomes of an order that leads to no better point.
-SETTLED, OPEN = 'settled', 'open'
+#: A place nearer to its least extent than this may be none: NLP solvers leave it a little above its bound.
+NEAR_BOUND = 1e-4
+#: Outcomes of an order that leads to no better point, and of a branch that does not contain the incumbent.
+SETTLED, OPEN, ABSENT = 'settled', 'open', 'absent'
+
+
+@dataclass(frozen=True)
+class _Order:
+    """An order of changes: equivalent ways to it, and functions that return the ``Verdict`` of an inserted place."""
+
+    ways: list
+    judges: list
+
+    @property
+    def key(self):
+        """Equal for orders with the same branches."""
+        return tuple((way.extents.tobytes(), way.zero.tobytes()) for way in self.ways) or id(self)
 
 
 class Coincidences:
@@ -75,17 +91,27 @@ class Coincidences:
         if better is not None:
             return better
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)
-        for ways in self._orders(point.w, sets):
-            key = tuple((way.extents.tobytes(), way.zero.tobytes()) for way in ways)
-            if key in tried:
+        for order in self._orders(point, sets):
+            if order.key in tried:
                 continue
-            tried.add(key)
-            found = self._first(partial(self._try, point), ways)
+            tried.add(order.key)
+            found = self._order(point, order)
             if found is OPEN:
                 outcome = OPEN
             elif found is not SETTLED:
                 return found
         return outcome
+
+    def _order(self, point, order):
+        """A better point in an order; or its outcome."""
+        verdicts = [judge() for judge in order.judges]
+        if Verdict.IMPOSSIBLE in verdicts or Verdict.NO_DESCENT in verdicts:
+            return SETTLED
+        found = self._first(partial(self._try, point), order.ways)
+        if found is ABSENT:
+            # the branch with a place to spare does not contain the point, but an inserted place may grow
+            return OPEN if Verdict.DESCENT in verdicts else SETTLED
+        return found
 
     def _is_flat(self, point):
         """Whether no direction descends, whatever the constraints."""
@@ -96,21 +122,22 @@ class Coincidences:
         """The first outcome of equivalent ways that is not open."""
         return next((found for found in (attempt(way) for way in ways) if found is not OPEN), OPEN)
 
-    def _orders(self, w, sets) -> Iterator[list]:
-        """For each order the equivalent ways."""
+    def _orders(self, point, sets) -> Iterator['_Order']:
+        w, inserted = point.w, OrdersByInsertion(self._subsolves, point, sets)
         for coincidence, at in self._situations(w, sets):
             present = [change for change in coincidence.changes if _differs(change, at)]
             for some in _subsets(present, coincidence.fixed):
                 rest = [change for change in present if change not in some]
+                moves = (inserted.later, some), (inserted.earlier, some if coincidence.fixed else rest)
+                judges = [partial(judge, coincidence, moved, present) for judge, moved in moves if at is sets]
                 later = (coincidence.later, _moved(at.zero, [c.later for c in some]))
                 if coincidence.fixed:
-                    earlier = (coincidence.earlier, _moved(at.zero, [c.earlier for c in some]))
-                    yield _possible(w, later)
-                    yield _possible(w, earlier)
+                    yield _Order(_possible(w, later), judges[:1])
+                    yield _Order(_possible(w, (coincidence.earlier, _moved(at.zero, [c.earlier for c in some]))), judges[1:])
                 else:
-                    yield _possible(w, later, (coincidence.earlier, _moved(at.zero, [c.earlier for c in rest])))
+                    yield _Order(_possible(w, later, (coincidence.earlier, _moved(at.zero, [c.earlier for c in rest]))), judges)
         for entered in branches(self._c, w, sets, self._tolerances.biactive):
-            yield [] if entered is None else [entered]
+            yield _Order([], []) if entered is None else _Order([entered], [partial(inserted.entered, entered)])
 
     def _situations(self, w, sets) -> Iterator[tuple]:
         """Each coincidence with the active sets; also those as if the place beside it, at its lower bound, were none."""
@@ -119,7 +146,7 @@ class Coincidences:
             yield coincidence, sets
             beside = ((coincidence.later, by_earlier, 'earlier'), (coincidence.earlier, by_later, 'later'))
             for variable, others, direction in beside:
-                if variable in others and variable is not None and w[variable] <= self._c.lbx[variable] + AT_BOUND:
+                if variable in others and variable is not None and w[variable] <= self._c.lbx[variable] + NEAR_BOUND:
                     zero = _moved(sets.zero, [getattr(change, direction) for change in others[variable].changes])
                     yield coincidence, ActiveSets(zero, np.zeros(len(zero), dtype=bool))
 
@@ -128,10 +155,10 @@ class Coincidences:
         enough = self._tolerances.descent
         with self._c.vanishing(way.extents):
             start, equal = self._beside(point, way)
-            if start in (SETTLED, OPEN):
+            if start in (ABSENT, OPEN):
                 return start
             if self._is_above(point, start):
-                return SETTLED
+                return ABSENT
             gamma = np.zeros(len(way.zero), dtype=bool)
             gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
             sets = ActiveSets(self._subsolves.settled(start.w, way.zero), gamma)
@@ -148,9 +175,9 @@ class Coincidences:
         more['box'][0][way.extents] = 0.0
         first = self._subsolves.attempt(start, zero, None, 1.0, **more)
         if first is None or first.status in INFEASIBLE:
-            return SETTLED, None
+            return ABSENT, None
         if first.solved and self._is_above(point, first):
-            return SETTLED, None
+            return ABSENT, None
         apart = self._decides(point.w, way.extents)
         solved, equal = self._branches.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
         if first.solved and (solved is None or not solved.solved):

@@ -10,7 +10,18 @@ import numpy as np
 from pyomo_fesd.core import DeferredInterrupt, phase
 from pyomo_fesd.mpcc.algorithm.state import LogEntry, Outcome, Run, Setup, Stop, Tolerances
 from pyomo_fesd.mpcc.nlp import nlp_solver
-from pyomo_fesd.mpcc.subproblems import RELAXATIONS, Branch, Lpec, Restoration, active_sets, certify_point, measure, settle
+from pyomo_fesd.mpcc.subproblems import (
+    RELAXATIONS,
+    Branch,
+    Insertions,
+    Lpec,
+    Parts,
+    Restoration,
+    active_sets,
+    certify_point,
+    measure,
+    settle,
+)
 
 #: With both sides within this factor of the root of the largest product, a pair is undecided.
 BIACTIVE = 3.0
@@ -38,6 +49,8 @@ class Subsolves:
         self._c, self._setup, self._options = setup.compiled, setup, setup.options
         self._sides, self._nlps, self._solver = setup.cache.sides, setup.cache.nlps, nlp_solver(setup.options.nlp_solver)
         self._lpec = Lpec(self._c, self._sides, self._options.lpec_options.value(), setup.deadline)
+        self.parts = Parts(self._c)
+        self._insertions = Insertions(self._c, self._sides, self.parts, self._lpec, tolerances)
 
     # called by the algorithm
 
@@ -80,6 +93,14 @@ class Subsolves:
         self._count(result)
         self._log('lpec', 0.0, w, 0, f'{result.value:.1e}' if result.solved else 'unsolved', started)
         return result
+
+    def insertion(self, point, sets, order, unchanged):
+        """The ``Verdict`` of a part that is inserted into a point; ``unchanged`` is one that changes nothing there."""
+        equal = self._c.evaluate(point.w).eta > self.tolerances.eta if point.equal is None else point.equal
+        with self._timed('lpec') as started:
+            verdict = self._insertions.verdict(point.w, sets, equal, order, unchanged)
+        self._log('order', 0.0, point.w, 0, verdict.value, started)
+        return verdict
 
     def suggestion(self, w, sets, Delta):
         """Solve an LPEC that may stop early."""

@@ -25,6 +25,7 @@ from pyomo_fesd.mpcc.compile.mpcc_data import MpccData
 from pyomo_fesd.mpcc.compile.mpcc_functions import MpccFunctions
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.parameters import parameter_values
+from pyomo_fesd.mpcc.compile.part_indices import part_indices
 from pyomo_fesd.mpcc.compile.round_off import EXACT
 from pyomo_fesd.mpcc.compile.scaled_functions import LARGE, ScaledFunctions, ScaledRows
 from pyomo_fesd.mpcc.compile.scaling import Scale, side_factors
@@ -142,6 +143,7 @@ class _Assembly:
             neighbours=_neighbours(hints.neighbour_branches, *positions, scale.x),
             coincidences=[_coincidence(hint, *positions) for hint in hints.coincidences],
             arrivals=arrival_indices(hints.arrivals, *positions),
+            parts=part_indices(hints.chains, positions[1]),
             followers=_followers(hints.followers, positions[0]),
             fillings=_fillings(hints.fillings, *positions, scale.x),
             **values.read(),
@@ -249,5 +251,6 @@ def _coincidence(hint, pairs, columns):
         ChangeIndices(*both_positions(change.differing, pairs), moves(change.later, pairs), moves(change.earlier, pairs))
         for change in hint.changes
     )
-    later, earlier = (None if v is None or id(v) not in columns else columns[id(v)][0] for v in (hint.later, hint.earlier))
-    return CoincidenceIndices(changes, later, earlier, hint.fixed)
+    extents = hint.later, hint.earlier, hint.before, hint.after
+    later, earlier, before, after = (None if v is None or id(v) not in columns else columns[id(v)][0] for v in extents)
+    return CoincidenceIndices(changes, later, earlier, hint.fixed, before, after)

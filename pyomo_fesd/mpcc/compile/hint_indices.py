@@ -60,6 +60,37 @@ class CoincidenceIndices:
     later: int | None
     earlier: int | None
     fixed: bool
+    before: int | None = None
+    after: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PartIndices:
+    """A ``Part`` by positions of variables.
+
+    Attributes
+    ----------
+    extent : int
+    own, gate : int arrays
+    first, last : int arrays
+        the same quantities at its beginning and at its end
+    ends : int array
+        all variables at its end
+    chain, number : int
+        its chain, and its place in it
+    whole : bool
+        whether all variables of the part are free, but for those that are given in all parts
+    """
+
+    extent: int
+    own: np.ndarray
+    gate: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    ends: np.ndarray
+    chain: int
+    number: int
+    whole: bool
 
 
 @dataclass(frozen=True, eq=False)

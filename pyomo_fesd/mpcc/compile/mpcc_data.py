@@ -25,6 +25,7 @@ class MpccData:
     neighbours : list of NeighbourIndices
     coincidences : list of CoincidenceIndices
     arrivals : list of ArrivalIndices
+    parts : list of PartIndices
     followers : FollowerIndices
     fillings : list of FillingIndices
     tentative : bool array, decisions that are dropped where they leave no solution
@@ -47,6 +48,7 @@ class MpccData:
     neighbours: list
     coincidences: list
     arrivals: list
+    parts: list
     followers: object
     fillings: list
     tentative: np.ndarray

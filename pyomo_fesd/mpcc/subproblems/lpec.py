@@ -21,7 +21,7 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from pyomo_fesd.mpcc.compile import major_index
+from pyomo_fesd.mpcc.compile import major_index, with_entries
 from pyomo_fesd.mpcc.nlp import Deadline, check_options
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO
 from pyomo_fesd.mpcc.subproblems.descent import Descent
@@ -60,7 +60,7 @@ class LpecResult:
 
 
 @dataclass(frozen=True)
-class _Linearised:
+class Linearised:
     """The LPEC at one point, without its binaries: the Program, its row blocks, and value and Jacobian of bi-active sides."""
 
     program: Program
@@ -114,18 +114,27 @@ class Lpec:
 
     def _solve(self, w, sets, Delta, equal, beyond, multipliers, enough, limits, released):
         """``solve``, with the positive sides of fillings, or where they are ``released`` without."""
-        equal = np.zeros(self._c.equal.numel(), dtype=bool) if equal is None else equal
-        reach = Delta * _sizes(w)
-        sets = release_followers(sets, self._c.followers, self._c.evaluate(w))
-        lower, upper = self._box(w, sets, reach, beyond, released)
-        sets = without_constant(sets, self._sides, (lower == 0.0) & (upper == 0.0))
-        at = self._linearised(w, sets, equal, reach, lower, upper, released)
-        descent = Descent(at.program, lambda: self._changes(w, sets, equal))
+        sets, equal, at = self.linearised(w, sets, Delta, equal, beyond, released)
+        rows = np.concatenate(row_places(sets, equal, len(self._c.lbg)))
+        descent = Descent(at.program, lambda: [(cost, partial(_product, A, rows)) for cost, A in self.changes(w)])
         if multipliers is not None and enough is not None:
             left = descent.proved(self._row_multipliers(multipliers, sets, equal))
             if left <= enough:
                 return LpecResult(True, 0.0, np.zeros(len(w)), sets.zero, 0)
-        found = self._mixed_integer(sets, at, enough is not None, limits)
+        return self.best(sets, at, descent, enough is not None, limits)
+
+    def linearised(self, w, sets, Delta, equal=None, beyond=False, released=False):
+        """The LPEC without its binaries; also the active sets and the decisions with which it was written."""
+        equal = np.zeros(self._c.equal.numel(), dtype=bool) if equal is None else equal
+        reach = Delta * sizes_of(w)
+        sets = release_followers(sets, self._c.followers, self._c.evaluate(w))
+        lower, upper = self.box(w, sets, reach, beyond, released)
+        sets = without_constant(sets, self._sides, (lower == 0.0) & (upper == 0.0))
+        return sets, equal, self._linearised(w, sets, equal, reach, lower, upper, released)
+
+    def best(self, sets, at, descent, clear, limits=None) -> LpecResult:
+        """The best direction of a linearised LPEC and its relative descent."""
+        found = self._mixed_integer(sets, at, clear, limits)
         if not found.solved or descent.negligible(found.value):
             return found
         return self._within_branch(at, sets, found, descent, limits)
@@ -140,30 +149,25 @@ class Lpec:
         other_H, other_G = (np.where(filled[kind], -np.inf, -side[kind]) for kind, side in ((alpha, H), (beta, G)))
         low = [np.minimum(c.lbg - at.g, 0.0), 0.0, other_H, 0.0, other_G, 0.0, -G[free], -H[free], -G[gamma], -H[gamma]]
         high = [np.maximum(c.ubg - at.g, 0.0), 0.0, np.inf, 0.0, np.inf, 0.0, np.inf, np.inf, np.inf, np.inf]
-        places = _places(sets, equal, len(c.lbg))
+        places = row_places(sets, equal, len(c.lbg))
         low, high = (np.concatenate([np.broadcast_to(v, len(rows)) for v, rows in zip(by, places)]) for by in (low, high))
         program = Program(gradients[0], c.stacked_jacobian(w)[np.concatenate(places)], low, high, lower, upper, reach)
-        return _Linearised(program, equal, G[gamma], H[gamma], J_G[gamma], J_H[gamma])
+        return Linearised(program, equal, G[gamma], H[gamma], J_G[gamma], J_H[gamma])
 
-    def _changes(self, w, sets, equal):
-        """Changes of the gradient and of the rows' products with multipliers along displacements of all variables by their sizes.
-
-        The displacements are within the bounds.
-        """
-        random, sizes = np.random.default_rng(SEED), _sizes(w)
-        gradient, A_here, changes = self._c.gradients(w)[0], self._c.stacked_jacobian(w), []
-        rows = np.concatenate(_places(sets, equal, len(self._c.lbg)))
+    def changes(self, w):
+        """Changes of the gradient and of all rows along displacements of all variables by their sizes, within their bounds."""
+        random, sizes = np.random.default_rng(SEED), sizes_of(w)
+        gradient, A, changes = self._c.gradients(w)[0], self._c.stacked_jacobian(w), []
         for _ in range(DISPLACEMENTS):
             step = DISPLACEMENT * sizes * random.choice((-1.0, 1.0), size=len(w))
             within = [(w + s >= self._c.lbx) & (w + s <= self._c.ubx) for s in (step, -step)]
             step = np.where(within[0], step, np.where(within[1], -step, 0.0))
             cost = np.nan_to_num((self._c.gradients(w + step)[0] - gradient) / DISPLACEMENT, posinf=0.0, neginf=0.0)
-            A = self._c.stacked_jacobian(w + step)
-            change = np.nan_to_num((A.data - A_here.data) / DISPLACEMENT, posinf=0.0, neginf=0.0)
-            changes.append((cost, partial(_product, A, change, rows)))
+            there = self._c.stacked_jacobian(w + step).data
+            changes.append((cost, with_entries(A, np.nan_to_num((there - A.data) / DISPLACEMENT, posinf=0.0, neginf=0.0))))
         return changes
 
-    def _box(self, w, sets, reach, beyond, released):
+    def box(self, w, sets, reach, beyond, released=False):
         """Bounds of d: the trust region; 0 for the variables of a side that is zero because they are at their bounds."""
         c = self._c
         free = c.guided & beyond
@@ -227,18 +231,18 @@ class Lpec:
         return replace(found, value=value, d=answer.d, descent=measured)
 
 
-def _product(A, numbers, rows, y):
-    """B' y with the ``rows`` of A (csr) that have other ``numbers`` as entries."""
+def _product(A, rows, y):
+    """B' y with the ``rows`` B of A (csr)."""
     factors = np.bincount(rows, y, A.shape[0])
-    return np.bincount(A.indices, numbers * factors[major_index(A)], A.shape[1])
+    return np.bincount(A.indices, A.data * factors[major_index(A)], A.shape[1])
 
 
-def _sizes(w):
+def sizes_of(w):
     """The size of each variable at ``w``."""
     return np.maximum(1.0, np.abs(w))
 
 
-def _places(sets, equal, m):
+def row_places(sets, equal, m):
     """The program's rows among all: own (m), pairs with G = 0, with H = 0, decisions, open pairs, bi-active pairs."""
     G = m + np.arange(len(sets.zero))
     H, decisions = G + len(G), m + 2 * len(G) + np.flatnonzero(equal)

@@ -69,6 +69,10 @@ class Sides:
         low[upper] = ubx[upper]
         return low, high
 
+    def fixed_by(self, zero, pairs):
+        """Variables at the bounds that make the zero sides of some ``pairs`` (mask) zero."""
+        return np.unique(self.fixings[np.flatnonzero(self.zero_rows(zero) & (self.row_of < 0) & np.tile(pairs, 2))].indices)
+
     def same_rows(self, other):
         """Whether the same sides have rows: NLPs were built for these, and for nothing else here."""
         return np.array_equal(self.row_of, other.row_of)

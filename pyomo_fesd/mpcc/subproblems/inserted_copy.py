@@ -1,0 +1,176 @@
+"""The limit of an inserted part as its extent goes to zero, and whether its bounds hold there.
+
+Takes: a point, and the zero sides of the copy.
+Leaves: the values at two small extents and at the limit.
+Does not apply: where the values have no limit, as a force that stops a body at once.
+"""
+
+import numpy as np
+
+from pyomo_fesd.mpcc.subproblems.inserted_part import InsertedPart
+from pyomo_fesd.mpcc.subproblems.lpec import sizes_of
+from pyomo_fesd.mpcc.subproblems.parts import stacked
+
+#: Extents of the copy, relative to the extent of its part, and their ratio.
+EXTENTS, RATIO = (1e-2, 1e-3), 0.1
+#: A limit exists if values differ by less than this, relative, over the two extents.
+NEAR = 0.2
+#: A bound that is missed by more than this, relative to the terms of its row, does not hold at the limit either.
+CLEAR = 1e-3
+#: A distance from a bound that shrinks by this factor or more is zero at the limit.
+SHRINKS = 0.5
+#: Smaller distances, relative, are round-off.
+ROUND_OFF = 1e-9
+#: Orders in the extent with which a bound may be missed.
+ORDERS = 1, 2, 3
+
+
+class Copy:
+    """A copy of a part.
+
+    Attributes
+    ----------
+    part : PartIndices
+    own : int array
+        the variables of the part
+    rows : int array
+        stacked numbers of its rows
+    limit : array (n)
+        the point with the values of the copy, at the limit, in place of those of the part
+    """
+
+    def __init__(self, c, sides, parts, insertion):
+        self._c, self._sides, self._parts, self._insertion = c, sides, parts, insertion
+        self.part, self.rows = parts.all[insertion.k], np.flatnonzero(parts.of_row == insertion.k)
+        self.own, self._inner = self.part.own, np.setdiff1d(self.part.own, [self.part.extent])
+        self._equations = InsertedPart(c, sides, parts, self._inner, self.rows, insertion.zero)
+        self._at, self.limit = [], None
+
+    def solve(self, w, guesses) -> bool:
+        """Find the values beside the point ``w``, from those of one of the parts ``guesses``."""
+        for guess in guesses:
+            self._at = []
+            for extent in EXTENTS:
+                start = self._start(w, guess) if not self._at else self._at[-1].copy()
+                start[self.part.extent] = extent * w[self.part.extent]
+                self._at.append(self._equations.solve(start))
+                if self._at[-1] is None:
+                    break
+            if self._at[-1] is not None and self._has_limit():
+                long, short = self._at
+                self.limit = _limit(long, short)
+                self.limit[self.part.extent] = 0.0
+                return True
+        return False
+
+    def _start(self, w, guess):
+        """Values of part ``guess``, its last ones those with which the copy begins."""
+        part, start = self.part, w.copy()
+        if not self._insertion.ahead:
+            start[part.first] = w[part.last]
+        given = self._parts.all[guess].own
+        if len(given) == len(part.own):
+            start[part.own] = w[given]
+        start[part.last] = start[part.first]
+        return start
+
+    def _has_limit(self):
+        determined = self._inner[~self._parts.is_gate[self._inner]]
+        long, short = (w[determined] for w in self._at)
+        return bool(np.all(np.abs(long - short) <= NEAR * np.maximum(1.0, np.abs(short))))
+
+    def contradicts_itself(self, w, guesses) -> bool:
+        """Whether its equations have no solution beside the point ``w``, however small the extent is."""
+        starts = [self._start(w, guesses[0]) for _ in EXTENTS]
+        for start, extent in zip(starts, EXTENTS):
+            start[self.part.extent] = extent * w[self.part.extent]
+        return all(map(self._equations.contradict, starts))
+
+    # bounds
+
+    def impossible(self, w) -> bool:
+        """Whether a bound of the copy does not hold beside the point ``w``, however small the extent is."""
+        long, short = (self._missed(at) for at in self._at)
+        if np.any(np.minimum(short, _limit(long, short)) > CLEAR):
+            return True
+        rows = np.flatnonzero((short > ROUND_OFF) & (short <= SHRINKS * long))
+        return any(self._misses_by_order(w, k, long[k] / short[k]) for k in rows if k < len(self.rows))
+
+    def _misses_by_order(self, w, k, ratio):
+        """Whether row ``k`` misses its bound by a power of the extent, and nothing beside the point can change that.
+
+        The part with which the copy begins must fix everything in it of a lower power.
+        """
+        order = next((p for p in ORDERS if 0.5 < ratio * RATIO**p < 2.0), None)
+        if order is None:
+            return False
+        before = self._before()
+        if before is None:
+            return False
+        left = [before.left_free(w, self._at_entry(self._equations.slopes(at, self.rows[k]))) for at in self._at]
+        return left[1] <= max(2.0 * RATIO**order * left[0], ROUND_OFF)
+
+    def _before(self):
+        """The equations of the part whose last values the copy begins with."""
+        k = self._insertion.k - self._insertion.ahead
+        if k < 0 or (k != self._insertion.k and self._parts.next(k) != self._insertion.k):
+            return None
+        rows = np.flatnonzero(self._parts.of_row == k)
+        return InsertedPart(self._c, self._sides, self._parts, self._parts.all[k].own, rows, self._insertion.zero_beside)
+
+    def _at_entry(self, slopes):
+        """Slopes by the variables of the model beside the copy, with the last ones before it for its first ones."""
+        found = slopes.copy()
+        found[self.part.extent] = 0.0
+        if self._insertion.ahead:
+            return found
+        found[self.part.first] = 0.0
+        found[self.part.last] = slopes[self.part.first]
+        return found
+
+    def _missed(self, w):
+        """By how much the copy misses the bounds of its rows and sides, and of its variables, relative to their terms."""
+        low, high = self._distances(w)
+        terms = np.maximum(1.0, abs(stacked(self._c.gradients(w))[self.rows]) @ np.abs(w))
+        own, inner = self._c, self._inner
+        of_variables = np.maximum(own.lbx[inner] - w[inner], w[inner] - own.ubx[inner]) / sizes_of(w[inner])
+        return np.concatenate([np.maximum(low, -high) / terms, of_variables])
+
+    def _distances(self, w):
+        """Distances to the lower and upper bounds of rows of the copy; zero sides have both."""
+        c, q, at = self._c, self._c.pairs, self._c.evaluate(w)
+        none = np.zeros(c.equal.numel())
+        values = np.concatenate([at.g, at.G, at.H, none])
+        high = np.concatenate([c.ubg, np.where(self._sides.zero_rows(self._insertion.zero), 0.0, np.inf), none + np.inf])
+        low = np.concatenate([c.lbg, np.zeros(2 * q), none - np.inf])
+        return (low - values)[self.rows], (high - values)[self.rows]
+
+    def limits(self, radius, fixed) -> tuple:
+        """Bounds of the rows and of the variables for a direction from the limit, and the reach of the variables.
+
+        ``fixed`` are variables that do not move either.
+        """
+        c, own = self._c, self.own
+        low, high = (_at_limit(*both) for both in zip(*map(self._distances, self._at)))
+        lower, upper = (_at_limit(*both) for both in zip(*((c.lbx[own] - w[own], c.ubx[own] - w[own]) for w in self._at)))
+        reach = radius * sizes_of(self.limit[own])
+        still, extent = np.isin(own, [*self.fixed, *fixed]), own == self.part.extent
+        lower, upper = np.where(still, 0.0, np.maximum(lower, -reach)), np.where(still, 0.0, np.minimum(upper, reach))
+        lower[extent], upper[extent] = 0.0, radius
+        return np.minimum(low, 0.0), np.maximum(high, 0.0), np.minimum(lower, 0.0), np.maximum(upper, 0.0), reach
+
+    @property
+    def fixed(self):
+        """Variables of the part, and among its first values, that do not move as sides are zero."""
+        return self._sides.fixed_by(self._insertion.zero, self._parts.of_pair == self._insertion.k)
+
+
+def _limit(long, short):
+    with np.errstate(invalid='ignore'):
+        return short + (short - long) * RATIO / (1 - RATIO)
+
+
+def _at_limit(long, short):
+    """Distances to bounds as the extent goes to zero, of those at two extents."""
+    vanish = (np.abs(short) <= SHRINKS * np.abs(long)) & np.isfinite(short)
+    return np.where(vanish, 0.0, short)

@@ -1,0 +1,180 @@
+"""Values of a part that is inserted beside another one, with a small extent.
+
+The rows of the other part, its first values and the sides of its pairs that are zero determine the values of the copy:
+
+    rows = bounds where both are equal,   zero sides = 0,   first values, extent and what parts share given
+
+A zero side that is a sum of rows and variables, which their bounds keep non-negative, makes each of them 0.  All other bounds are
+not used, so that the values show whether they hold.
+
+Takes: a point, the part, and zero sides.
+Leaves: the point with the values of the copy in place of those of the part; None where they are not determined.
+"""
+
+import numpy as np
+from scipy import sparse
+from scipy.optimize import nnls
+
+from pyomo_fesd.mpcc.subproblems.parts import stacked
+
+#: Newton steps; residual of the rows, each over its largest entry, and last step, at which they end.
+STEPS, RESIDUAL, LAST_STEP = 30, 1e-10, 1e-7
+#: Equations that leave more than this, relative to their terms, contradict each other; the point at which they are compared.
+CONTRADICTION, SEED = 1e-3, 0
+#: Agreement of a side with a sum of rows.
+EXACT = 1e-9
+#: Singular values below this, relative to the largest one, are zero: extents enter with their square.
+SINGULAR = 1e-13
+
+
+class InsertedPart:
+    """The equations of part ``k`` at one assignment.
+
+    Parameters
+    ----------
+    c : MpccFunctions
+    sides : Sides
+    parts : Parts
+    k : int
+    zero : int array (q)
+        zero sides of all pairs; only those of the part count
+    columns : int array
+        variables to determine
+    rows : int array
+        stacked numbers of the rows among which the equations are
+    """
+
+    def __init__(self, c, sides, parts, columns, rows, zero):
+        self._c, self._m, self._q = c, len(c.lbg), c.pairs
+        self._rows, self._gates = rows, parts.is_gate
+        self._zero_rows = np.zeros(self._m + 2 * self._q + c.equal.numel(), dtype=bool)
+        self._zero_rows[self._m : self._m + 2 * self._q] = sides.zero_rows(zero)
+        self._low = np.concatenate([c.lbg, np.zeros(2 * self._q), np.full(c.equal.numel(), -np.inf)])
+        self._high = np.concatenate([c.ubg, np.full(2 * self._q + c.equal.numel(), np.inf)])
+        self._columns = columns
+
+    def solve(self, w):
+        """``w`` with the values that the equations determine; None if they are not determined, or not found."""
+        rows, fixed, at = self._equations(w)
+        w = w.copy()
+        w[fixed] = at
+        free = np.setdiff1d(self._columns, fixed)
+        for _ in range(STEPS):
+            J = stacked(self._c.gradients(w))[rows]
+            residual = (self._values(w) - self._low)[rows]
+            scale = _largest(J)
+            A = (sparse.diags(1 / scale) @ J)[:, free].toarray()
+            step, determined = self._step(A, residual / scale, w, free)
+            w[free] += step
+            if np.abs(step).max(initial=0.0) <= LAST_STEP * max(1.0, np.abs(w[free]).max(initial=0.0)):
+                left = np.abs((self._values(w) - self._low)[rows] / scale).max(initial=0.0)
+                return w if determined and left <= RESIDUAL else None
+        return None
+
+    def contradict(self, w) -> bool:
+        """Whether equations that are linear in the variables to determine contradict each other, whatever their values."""
+        rows, fixed, at = self._equations(w)
+        w = w.copy()
+        w[fixed] = at
+        free, other = np.setdiff1d(self._columns, fixed), w.copy()
+        other[free] += np.random.default_rng(SEED).uniform(0.1, 1.0, len(free))
+        A, B = (stacked(self._c.gradients(at))[rows][:, free].toarray() for at in (w, other))
+        linear = np.abs(A - B).max(axis=1, initial=0.0) <= EXACT
+        terms = np.maximum(1.0, abs(stacked(self._c.gradients(w))[rows]) @ np.abs(w))
+        A, residual = A[linear] / terms[linear, None], ((self._values(w) - self._low)[rows] / terms)[linear]
+        left = residual - A @ np.linalg.lstsq(A, residual, rcond=SINGULAR)[0] if len(A) else residual
+        return bool(np.abs(left).max(initial=0.0) > CONTRADICTION)
+
+    def slopes(self, w, row):
+        """Derivatives of a row where the equations hold, by all variables that they do not determine."""
+        J = stacked(self._c.gradients(w))
+        rows, fixed, _ = self._equations(w)
+        free, found = np.setdiff1d(self._columns, fixed), J[row].toarray().ravel()
+        scale = sparse.diags(1 / _largest(J[rows]))
+        weights = np.linalg.lstsq((scale @ J[rows])[:, free].toarray().T, found[free], rcond=None)[0]
+        found = found - (scale @ J[rows]).T @ weights
+        found[self._columns] = 0.0
+        return found
+
+    def left_free(self, w, gradient):
+        """The part of a gradient that the equations leave: its distance from the space that their gradients span."""
+        J = stacked(self._c.gradients(w))
+        rows, fixed, _ = self._equations(w, all_free=True)
+        basis = (sparse.diags(1 / _largest(J[rows])) @ J[rows]).toarray()
+        some = np.flatnonzero(np.any(basis != 0.0, axis=0) | (gradient != 0.0))
+        some = some[~np.isin(some, fixed)]
+        weights = np.linalg.lstsq(basis[:, some].T, gradient[some], rcond=SINGULAR)[0]
+        return float(np.abs(gradient[some] - basis[:, some].T @ weights).max(initial=0.0))
+
+    def _values(self, w):
+        at = self._c.evaluate(w)
+        return np.concatenate([at.g, at.G, at.H, np.zeros(self._c.equal.numel())])
+
+    def _equations(self, w, all_free=False):
+        """Rows that are equations of variables to determine, or of any; variables that are fixed, and their values."""
+        J = stacked(self._c.gradients(w))
+        rows = self._rows
+        equations = rows[self._low[rows] == self._high[rows]].tolist()
+        fixed = {}
+        for row in rows[self._zero_rows[rows]]:
+            of_rows, of_variables = self._parts_of_sum(J, w, row)
+            equations += of_rows
+            fixed |= of_variables
+        own = set(self._columns.tolist())
+        fixed = {j: value for j, value in fixed.items() if all_free or j in own}
+        free = np.full(J.shape[1], all_free)
+        free[self._columns] = True
+        free[list(fixed)] = False
+        equations = np.unique(np.array(equations, dtype=int))
+        has_free = abs(J[equations]) @ free.astype(float) > 0
+        return equations[has_free], np.array(list(fixed), dtype=int), np.array(list(fixed.values()))
+
+    def _parts_of_sum(self, J, w, row):
+        """Rows at 0 and variables at bounds of which a zero side is a sum; the row itself if it is not."""
+        entries, m = J[row], self._m
+        columns, inside = entries.indices, np.zeros(J.shape[1], dtype=bool)
+        inside[columns] = True
+        support = np.diff(J.indptr[: m + 1])
+        among = np.flatnonzero((support > 0) & (_ones(J[:m]) @ inside.astype(float) == support) & np.isfinite(self._low[:m]))
+        among = among[self._low[among] < self._high[among]]
+        lower, upper = (columns[np.isfinite(bound[columns])] for bound in (self._c.lbx, self._c.ubx))
+        unit = sparse.identity(J.shape[1], format='csr')[:, columns]
+        basis = sparse.vstack([J[among][:, columns], unit[lower], -unit[upper]]).toarray().T
+        weights, left = nnls(basis, entries.data) if basis.shape[1] else (np.zeros(0), np.inf)
+        values = self._values(w)
+        terms = np.concatenate([values[among] - self._low[among], w[lower] - self._c.lbx[lower], self._c.ubx[upper] - w[upper]])
+        constant = values[row] - weights @ terms if len(weights) else np.inf
+        if max(left, abs(constant)) > EXACT * max(1.0, np.abs(entries.data).max(initial=0.0), np.abs(w[columns]).max(initial=0.0)):
+            return [row], {}
+        of_rows, of_lower, of_upper = np.split(weights > EXACT, np.cumsum([len(among), len(lower)]))
+        fixed = {j: self._c.lbx[j] for j in lower[of_lower]} | {j: self._c.ubx[j] for j in upper[of_upper]}
+        return among[of_rows].tolist(), fixed
+
+    def _step(self, A, residual, w, free):
+        """A Newton step of least length, the variables of gates within their bounds; and whether all others are determined."""
+        at_bound = np.zeros(len(free), dtype=bool)
+        gates, low = self._gates[free], self._c.lbx[free]
+        for _ in range(1 + np.count_nonzero(gates)):
+            inner = ~at_bound
+            step = np.where(at_bound, low - w[free], 0.0)
+            U, s, Vt = np.linalg.svd(A[:, inner]) if inner.any() and len(A) else (np.eye(len(A)), np.zeros(0), np.eye(inner.sum()))
+            rank = int(np.count_nonzero(s > SINGULAR * s.max(initial=0.0)))
+            target = -residual - A[:, at_bound] @ step[at_bound]
+            step[inner] = Vt[:rank].T @ ((U[:, :rank].T @ target) / s[:rank])
+            below = gates & inner & (w[free] + step < low - EXACT)
+            if not below.any():
+                undetermined = np.abs(Vt[rank:]).max(axis=0, initial=0.0)
+                return step, not np.any(undetermined[~gates[inner]] > 1e-6)
+            at_bound |= below
+        return step, False
+
+
+def _largest(J):
+    found = abs(J).max(axis=1).toarray().ravel() if J.shape[0] else np.zeros(0)
+    return np.where(found > 0, found, 1.0)
+
+
+def _ones(matrix):
+    found = matrix.copy()
+    found.data = np.ones_like(found.data)
+    return found

@@ -1,0 +1,178 @@
+"""Whether a part inserted with extent zero may grow with descent (theory, section 4, orders).
+
+The copy of part k begins with the last values of the part before it, and the part after it with those of the copy:
+
+    part j-1  ->  copy of k, of extent h  ->  part j,        j = k (before it) or j = k + 1 (after it)
+
+With h = 0 this is the present point, whatever the zero sides of the copy.  Its values as h -> 0 show whether these sides are
+possible beside the point; if they are, the LPEC with the copy shows whether h may grow with descent.
+
+Takes: a point, and zero sides of the copy and of the part after it.
+Leaves: a ``Verdict``.
+Does not apply: where the values of the copy are not determined, or have no limit; beside parts of nearly no extent; with fillings.
+"""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from pyomo_fesd.mpcc.subproblems.active_set import FREE, ActiveSets
+from pyomo_fesd.mpcc.subproblems.descent import Descent
+from pyomo_fesd.mpcc.subproblems.inserted_copy import Copy
+from pyomo_fesd.mpcc.subproblems.inserted_part import InsertedPart
+from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec
+
+#: Parts that are shorter than this, relative to the longest one beside them, have nearly no extent.
+SHORT = 0.01
+
+
+class Verdict(Enum):
+    """What an inserted part shows."""
+
+    IMPOSSIBLE = 'its sides are not possible beside the point'
+    NO_DESCENT = 'it cannot grow with descent'
+    DESCENT = 'it may grow with descent'
+    UNKNOWN = 'not decided'
+
+
+@dataclass(frozen=True)
+class Insertion:
+    """A copy of a part, and where it is inserted.
+
+    Attributes
+    ----------
+    k : int
+        the part that is copied
+    ahead : bool
+        whether the copy lies before part k, or after it
+    zero : int array (q)
+        zero sides, of which those of part k are the copy's
+    zero_beside : int array (q)
+        zero sides of all others
+    guesses : tuple of int
+        parts whose values to start from
+    """
+
+    k: int
+    ahead: bool
+    zero: np.ndarray
+    zero_beside: np.ndarray
+    guesses: tuple
+
+
+class Insertions:
+    """Judges the insertions into one compiled MPCC.
+
+    Parameters
+    ----------
+    c : MpccFunctions
+    sides : Sides
+    parts : Parts
+    lpec : Lpec
+    tolerances : Tolerances
+    """
+
+    def __init__(self, c, sides, parts, lpec, tolerances):
+        self._c, self._sides, self._parts, self._lpec, self._tolerances = c, sides, parts, lpec, tolerances
+
+    def verdict(self, w, sets, equal, insertion, present) -> Verdict:
+        """Judge an insertion into the point ``w`` with active sets ``sets`` and the decisions ``equal`` in force.
+
+        Parameters
+        ----------
+        present : Insertion or None
+            at the same place, with the sides that are there already: a descent that it has too is one of uneven extents.  None:
+            whether the copy may grow is not looked at
+        """
+        part = self._parts.all[insertion.k]
+        if not self._applies(w, insertion):
+            return Verdict.UNKNOWN
+        with self._c.vanishing(np.array([part.extent])):
+            copy = Copy(self._c, self._sides, self._parts, insertion)
+            verdict = self._by_values(w, insertion, copy)
+            if verdict is not None or present is None:
+                return verdict or Verdict.UNKNOWN
+            found = self._by_lpec(w, sets, equal, insertion, copy, 0.0)
+            if found is not None and found.descent > self._tolerances.descent:
+                found = self._by_lpec(w, sets, equal, insertion, copy, self._credit(w, sets, equal, present))
+        if found is None or not found.solved:
+            return Verdict.UNKNOWN
+        return Verdict.DESCENT if found.descent > self._tolerances.descent else Verdict.NO_DESCENT
+
+    def _applies(self, w, insertion):
+        part, following = self._parts.all[insertion.k], self._following(insertion)
+        # where amounts lie in fillings depends on all extents before them
+        possible = part.whole and following is not None and not self._c.fillings
+        return possible and not self._is_beside_a_short_part(w, insertion.k)
+
+    @staticmethod
+    def _by_values(w, insertion, copy):
+        """The verdict that the values of the copy give; None if its sides are possible."""
+        if not copy.solve(w, insertion.guesses):
+            return Verdict.IMPOSSIBLE if copy.contradicts_itself(w, insertion.guesses) else Verdict.UNKNOWN
+        return Verdict.IMPOSSIBLE if copy.impossible(w) else None
+
+    def _is_beside_a_short_part(self, w, k):
+        """Whether part ``k`` or one beside it has nearly no extent: what it holds need not be what follows or precedes."""
+        beside = [w[self._parts.all[j].extent] for j in (k - 1, k, k + 1) if 0 <= j < len(self._parts.all)]
+        return min(beside) < SHORT * max(beside)
+
+    def _credit(self, w, sets, equal, present):
+        """The descent, for each unit of its extent, of a copy that changes nothing: the error of the method."""
+        copy = self._copy(w, present)
+        found = None if copy is None else self._by_lpec(w, sets, equal, present, copy, 0.0)
+        if found is None or not found.solved or found.descent <= self._tolerances.descent:
+            return 0.0
+        grown = found.d[len(w) + int(np.flatnonzero(copy.own == copy.part.extent)[0])]
+        return -found.value / grown if grown > 0 else 0.0
+
+    def _following(self, insertion):
+        """The part after the copy."""
+        return insertion.k if insertion.ahead else self._parts.next(insertion.k)
+
+    def _copy(self, w, insertion):
+        """The copy with its values at the limit; None without one."""
+        copy = Copy(self._c, self._sides, self._parts, insertion)
+        return copy if copy.solve(w, insertion.guesses) else None
+
+    def _beside(self, w, present, insertion, copy):
+        """The point in which the part after the copy begins with its last values; None if its beginning is not determined."""
+        following = self._following(insertion)
+        first, gate = self._parts.all[following].first, self._parts.all[following].gate
+        w = w.copy()
+        w[first] = copy.limit[copy.part.last if insertion.ahead else first]
+        changed = (insertion.zero_beside != present) & self._parts.in_gate & (self._parts.of_pair == following)
+        if not changed.any():
+            return w
+        rows = np.flatnonzero(self._parts.of_row == following)
+        equations = InsertedPart(self._c, self._sides, self._parts, gate, self._in_gate(rows, following), insertion.zero_beside)
+        return equations.solve(w)
+
+    def _in_gate(self, rows, k):
+        """Those of the rows of part ``k`` that only say how it begins."""
+        inner = self._parts.of_variable == k
+        inner[self._parts.all[k].gate] = inner[self._parts.all[k].extent] = False
+        return rows[self._parts.pattern[rows] @ inner.astype(float) == 0]
+
+    def _by_lpec(self, w, sets, equal, insertion, copy, credit):
+        """The LPEC with the copy, growing at ``credit`` more for each unit; None where what follows the copy is not determined."""
+        following = self._following(insertion)
+        beside = self._beside(w, sets.zero, insertion, copy)
+        if beside is None:
+            return None
+        sets = ActiveSets(insertion.zero_beside, sets.gamma & (insertion.zero_beside == sets.zero))
+        (sets, equal, base), (others, _, there) = (
+            self._lpec.linearised(at, sets, self._tolerances.radius, equal, beyond=True) for at in (w, beside)
+        )
+        if not (sets.same_sides(others) and np.array_equal(sets.gamma, others.gamma)):
+            return None
+        joined = JoinedLpec(self._c, self._sides, self._parts, insertion, following, sets, equal)
+        unfixed = replace(sets, zero=np.where(self._parts.of_pair == following, FREE, sets.zero))
+        base = joined.with_following(base, there)
+        base = replace(base, program=joined.unfixed(base.program, *self._lpec.box(w, unfixed, base.program.reach, beyond=True)))
+        limits = copy.limits(self._tolerances.radius, joined.fixed_by_following)
+        points = w, beside, copy.limit
+        at = joined.linearised(base, [joined.rows_of(self._c.gradients(at)) for at in points], credit, limits, copy.fixed)
+        descent = Descent(at.program, lambda: [(cost, A.T.dot) for cost, A in joined.changes(*map(self._lpec.changes, points))])
+        return self._lpec.best(sets, at, descent, True)

@@ -1,0 +1,118 @@
+"""The LPEC of a model with a copy of one of its parts, assembled from matrices of the model itself.
+
+    rows of the model            at the point; those of the part after the copy begin with the last values of the copy
+    rows of the copied part      at the values of the copy, in columns of its own; they begin with the last values before it
+    shared rows and objective    get the column of the extent of the copy; where that is 0, no other variable of it matters
+
+Takes: the LPEC at the point, and gradients at the point, beside the copy, and in the copy.
+Leaves: a ``Linearised`` LPEC, whose last variables are those of the copy.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import sparse
+
+from pyomo_fesd.mpcc.subproblems.linear_program import Program
+from pyomo_fesd.mpcc.subproblems.lpec import Linearised, row_places
+from pyomo_fesd.mpcc.subproblems.parts import SHARED, stacked
+
+
+class JoinedLpec:
+    """Joins the model and the copy of one insertion; ``following`` is the part after the copy."""
+
+    def __init__(self, c, sides, parts, insertion, following, sets, equal):
+        part, n = parts.all[insertion.k], len(c.x0)
+        self.rows, self.own = np.flatnonzero(parts.of_row == insertion.k), part.own
+        self._n, self._extent = n, part.extent
+        self._program_rows = np.concatenate(row_places(sets, equal, len(c.lbg)))
+        self._last = 2 * int(sets.gamma.sum())
+        place = {j: n + i for i, j in enumerate(part.own)}
+        after = parts.all[following]
+        passed_on = dict(zip(part.first, part.last)) if insertion.ahead else {j: j for j in after.first}
+        self._of_following = {j: place[passed_on[j]] for j in after.first if passed_on[j] in place}
+        self._of_copy = place | ({} if insertion.ahead else dict(zip(part.first, part.last)))
+        still = sides.fixed_by(sets.zero, parts.of_pair == following)
+        self.fixed_by_following = [passed_on[j] for j in still if j in self._of_following]
+        self._follows = parts.of_row[self._program_rows] == following
+        self._of_part = parts.of_variable == following
+        self._shares = parts.of_row[self._program_rows] == SHARED
+
+    @staticmethod
+    def rows_of(gradients):
+        """Gradient of the objective, and all rows."""
+        return gradients[0], stacked(gradients)
+
+    def with_following(self, base, other):
+        """The LPEC with the rows and variables of the part after the copy linearised at another point."""
+        p, q = base.program, other.program
+        low, high = (np.where(self._follows, new, old) for old, new in ((p.low, q.low), (p.high, q.high)))
+        lower, upper = (np.where(self._of_part, new, old) for old, new in ((p.lower, q.lower), (p.upper, q.upper)))
+        half = self._last // 2
+        G, H = (self._follows[len(self._follows) - self._last :][part] for part in (slice(half), slice(half, None)))
+        program = replace(p, low=low, high=high, lower=lower, upper=upper)
+        return replace(base, program=program, G=np.where(G, other.G, base.G), H=np.where(H, other.H, base.H))
+
+    def linearised(self, base, points, credit, limits, fixed):
+        """The LPEC with the copy, without its binaries."""
+        p, y, (low, high, lower, upper, reach) = self._with_fixed(base.program, fixed), self._last, limits
+        cost, A = self._joined(*points)
+        cost[self._place_of_extent] += credit
+        program = Program(
+            cost,
+            A,
+            *(self._inserted(given, new) for given, new in ((p.low, low), (p.high, high))),
+            np.concatenate([p.lower, lower]),
+            np.concatenate([p.upper, upper]),
+            np.concatenate([p.reach, reach]),
+        )
+        half = A.shape[0] - y // 2
+        return Linearised(program, base.equal, base.G, base.H, A[A.shape[0] - y : half], A[half:])
+
+    def unfixed(self, program, lower, upper):
+        """A program in which first values of the part after the copy are not fixed by its sides: they are those of the copy now."""
+        j, low, high = list(self._of_following), program.lower.copy(), program.upper.copy()
+        low[j], high[j] = lower[j], upper[j]
+        return replace(program, lower=low, upper=high)
+
+    def _with_fixed(self, program, fixed):
+        """A program in which variables that the sides of the copy fix do not move."""
+        j = np.array([self._of_copy.get(i, i) for i in fixed], dtype=int)
+        low, high = program.lower.copy(), program.upper.copy()
+        low[j[j < self._n]] = high[j[j < self._n]] = 0.0
+        return replace(program, lower=low, upper=high)
+
+    def changes(self, *points):
+        """Changes of cost and rows along displacements."""
+        return [self._joined(*of_points) for of_points in zip(*points)]
+
+    def _inserted(self, given, new):
+        """Rows of bi-active pairs stay the last ones."""
+        cut = len(given) - self._last
+        return np.concatenate([given[:cut], new, given[cut:]])
+
+    def _joined(self, here, beside, there):
+        """Cost and rows of the model with the copy, of those at the point, beside the copy, and in the copy."""
+        (cost, A), (_, of_following), (cost_of_copy, of_copy) = here, beside, there
+        follows = sparse.diags(self._follows.astype(float))
+        A = A[self._program_rows]
+        A = A + follows @ (of_following[self._program_rows] - A)
+        extra = np.zeros(len(self.own))
+        extra[self.own == self._extent] = cost_of_copy[self._extent]
+        base = self._with_columns(A, self._follows, self._of_following)
+        shares = of_copy[self._program_rows][:, self._extent].toarray().ravel() * self._shares
+        base = base + sparse.csr_matrix((shares, (np.arange(len(shares)), np.full(len(shares), self._place_of_extent))), base.shape)
+        new = self._with_columns(of_copy[self.rows], np.ones(len(self.rows), dtype=bool), self._of_copy)
+        cut = base.shape[0] - self._last
+        return np.concatenate([cost, extra]), sparse.vstack([base[:cut], new, base[cut:]], format='csr')
+
+    @property
+    def _place_of_extent(self):
+        return self._n + int(np.flatnonzero(self.own == self._extent)[0])
+
+    def _with_columns(self, A, chosen, places):
+        """Rows in the columns of the model and of the copy; entries of the ``chosen`` rows move to other ``places``."""
+        entries, move = A.tocoo(), np.arange(self._n)
+        move[list(places)] = list(places.values())
+        columns = np.where(chosen[entries.row], move[entries.col], entries.col)
+        return sparse.csr_matrix((entries.data, (entries.row, columns)), (A.shape[0], self._n + len(self.own)))

@@ -1,0 +1,115 @@
+"""Which rows and pairs of a compiled MPCC belong to which of its parts.
+
+A row belongs to a part if it contains variables of the part, and besides them only the last values of the part before and variables
+that belong to no part.  A row with variables of more parts is shared.  The sides of a pair belong to the same part.
+
+Takes: a compiled MPCC with ``parts``, and the pattern of its Jacobians.
+Leaves: numbers of parts by variable, row and pair.
+"""
+
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+#: Instead of the number of a part: of none, and of several.
+NONE, SHARED = -1, -2
+
+
+class Parts:
+    """The parts of one compiled MPCC.
+
+    Rows are numbered as in ``stacked``: own rows (m), G (q), H (q), decisions.
+    """
+
+    def __init__(self, c):
+        self._c, self.all = c, c.parts
+        self.by_extent = {part.extent: k for k, part in enumerate(c.parts)}
+
+    def next(self, k):
+        """The number of the part after part ``k``; None without one."""
+        if k + 1 == len(self.all):
+            return None
+        part, other = self.all[k], self.all[k + 1]
+        return k + 1 if (other.chain, other.number) == (part.chain, part.number + 1) else None
+
+    @cached_property
+    def of_variable(self):
+        """The part of each variable (n)."""
+        found = np.full(len(self._c.x0), NONE)
+        for k, part in enumerate(self.all):
+            found[part.own] = k
+        return found
+
+    @cached_property
+    def is_gate(self):
+        """Whether a variable (n) only says how its part begins."""
+        found = np.zeros(len(self._c.x0), dtype=bool)
+        for part in self.all:
+            found[part.gate] = True
+        return found
+
+    @cached_property
+    def _is_last(self):
+        found = np.zeros(len(self._c.x0), dtype=bool)
+        for part in self.all:
+            found[part.ends] = True
+        return found
+
+    @cached_property
+    def pattern(self):
+        """Ones where a row contains a variable."""
+        found = stacked(self._c.gradients(self._c.x0))
+        found.data = np.ones_like(found.data)
+        return found
+
+    @cached_property
+    def of_row(self):
+        """The part of each row; both sides of a pair have the same one."""
+        pattern, m, q = self.pattern, len(self._c.lbg), self._c.pairs
+        found = np.array([self._part_of(columns) for columns in np.split(pattern.indices, pattern.indptr[1:-1])], dtype=int)
+        if q:
+            both = pattern[m : m + q] + pattern[m + q : m + 2 * q]
+            of_pairs = [self._part_of(columns) for columns in np.split(both.indices, both.indptr[1:-1])]
+            found[m : m + 2 * q] = np.tile(np.array(of_pairs, dtype=int), 2)
+        return found
+
+    @property
+    def of_pair(self):
+        """The part of each pair."""
+        m = len(self._c.lbg)
+        return self.of_row[m : m + self._c.pairs]
+
+    @cached_property
+    def in_gate(self):
+        """Whether a pair contains no variable of its part but those of its gate, and its extent."""
+        m, q = len(self._c.lbg), self._c.pairs
+        pattern = self.pattern
+        inner = self.of_variable >= 0
+        inner[self.is_gate | self._is_last] = False
+        inner[[part.extent for part in self.all]] = False
+        counts = pattern @ inner.astype(float)
+        own_last = self._with_own_last(pattern)
+        return (counts[m : m + q] + counts[m + q : m + 2 * q] == 0) & ~(own_last[m : m + q] | own_last[m + q : m + 2 * q])
+
+    def _with_own_last(self, pattern):
+        """Whether a row contains last values of the part that it belongs to."""
+        entries = pattern.tocoo()
+        hit = self._is_last[entries.col] & (self.of_variable[entries.col] == self.of_row[entries.row])
+        found = np.zeros(pattern.shape[0], dtype=bool)
+        found[entries.row[hit]] = True
+        return found
+
+    def _part_of(self, columns):
+        owners = self.of_variable[columns]
+        parts = np.unique(owners[owners >= 0])
+        if len(parts) < 2:
+            return parts[0] if len(parts) else NONE
+        one, other = parts[-2:]
+        adjacent = len(parts) == 2 and self.next(one) == other
+        return other if adjacent and self._is_last[columns[owners == one]].all() else SHARED
+
+
+def stacked(gradients):
+    """All rows: own, G, H, decisions."""
+    return sparse.vstack(gradients[1:], format='csr')
