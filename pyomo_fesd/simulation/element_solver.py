@@ -211,7 +211,7 @@ class ElementSolver:
                 continue
             reached = element_class.followed(equations, self._end, most, self._left_boundary(equations, element))
             if 0 < reached < ENDS * most:
-                raise self._solution_ends(most, reached, answer)
+                raise self._solution_ends(element_class, equations, most, reached, answer)
         raise self._no_step(element_class, equations, most, answer, element)
 
     def _length_beyond(self, element_class, equations, most):
@@ -227,19 +227,16 @@ class ElementSolver:
         self._progress.check_time()
         return found
 
-    def _solution_ends(self, most, reached, answer):
+    def _solution_ends(self, element_class, equations, most, reached, answer):
         return self._progress.error(
             f"no step of length {most:.6g} was found from time {self._progress.time:.6g}: {answer.outcome}; steps from there are "
-            f"solved up to a length of {reached:.3g}, and longer ones are not",
+            f"solved up to a length of {reached:.3g}, and longer ones are not{self._forced(element_class, equations, most)}",
             "check the equations and the values there: the solution ends or bursts within that length, as from initial values that "
             "are far from any balance; where it is only steep, elements of that length help",
         )
 
     def _no_step(self, element_class, equations, most, answer, element):
-        mpcc, now = element_class.mpcc, f"{self._progress.time:.6g}"
-        mpcc.solve(equations, most / element_class.nominal, most / element_class.nominal)
-        residuals = largest_residuals(self._model, self._times, equations, mpcc.values)
-        forced = f"; where one is forced, {residuals}" if residuals else ''
+        now, forced = f"{self._progress.time:.6g}", self._forced(element_class, equations, most)
         jump = self._jump_of_given_state(element)
         if jump:
             return self._progress.error(
@@ -256,6 +253,13 @@ class ElementSolver:
             f"no step was found from time {now}: {answer.outcome}{forced}",
             "check the equations there; more elements help where the solution is steep",
         )
+
+    def _forced(self, element_class, equations, most):
+        """The largest residuals where a step of the length ``most`` is forced."""
+        mpcc, length = element_class.mpcc, most / element_class.nominal
+        mpcc.solve(equations, length, length)
+        residuals = largest_residuals(self._model, self._times, equations, mpcc.values)
+        return f"; where one is forced, {residuals}" if residuals else ''
 
     def _jump_of_given_state(self, element):
         """A sentence on a state that is given and has another value right of the boundary than on it; empty without one."""

@@ -104,6 +104,7 @@ class HybridSolver:
         if self.run.point is None:
             self._search_everywhere()
         self._c.widen()
+        self._descend_at_last()
         self._settle()
         point = self.run.point
         if point is None:
@@ -111,6 +112,13 @@ class HybridSolver:
         if not point.certificate.certified:
             return Outcome.FEASIBLE
         return Outcome.CERTIFIED if self._c.has_objective else Outcome.SOLVED
+
+    def _descend_at_last(self):
+        """Descend from a point that was not worth it on the way, as the homotopy promised better ones that it did not find."""
+        point = self.run.point
+        if point is not None and point.certificate.grade is Stationarity.DESCENT:
+            self._branches.forget()
+            self._branches.improve_from(point, True)
 
     def _settle(self):
         """Go to more even solutions and try all orders of changes, until neither leads on."""

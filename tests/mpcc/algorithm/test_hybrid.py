@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pyomo.environ as pyo
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from problems import small_mpccs
 from pyomo.mpec import Complementarity, complements
@@ -118,6 +118,7 @@ def branch_values(data):
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10**6), n=st.integers(2, 4), q=st.integers(1, 2))
+@example(seed=509504, n=4, q=2)  # the only point of the path was not worth a descent on the way
 def test_random_linear_problems_agree_with_enumeration(seed, n, q):
     data = random_lpcc(seed, n, q)
     values = list(branch_values(data))
