@@ -228,15 +228,19 @@ class ElementSolver:
         return found
 
     def _solution_ends(self, element_class, equations, most, reached, answer):
+        residuals = largest_residuals(self._model, self._times, equations, element_class.mpcc.values)
         return self._progress.error(
             f"no step of length {most:.6g} was found from time {self._progress.time:.6g}: {answer.outcome}; steps from there are "
-            f"solved up to a length of {reached:.3g}, and longer ones are not{self._forced(element_class, equations, most)}",
+            f"solved up to a length of {reached:.3g}, and longer ones are not{f'; {residuals}' if residuals else ''}",
             "check the equations and the values there: the solution ends or bursts within that length, as from initial values that "
             "are far from any balance; where it is only steep, elements of that length help",
         )
 
     def _no_step(self, element_class, equations, most, answer, element):
-        now, forced = f"{self._progress.time:.6g}", self._forced(element_class, equations, most)
+        mpcc, now = element_class.mpcc, f"{self._progress.time:.6g}"
+        mpcc.solve(equations, most / element_class.nominal, most / element_class.nominal)
+        residuals = largest_residuals(self._model, self._times, equations, mpcc.values)
+        forced = f"; where one is forced, {residuals}" if residuals else ''
         jump = self._jump_of_given_state(element)
         if jump:
             return self._progress.error(
@@ -253,13 +257,6 @@ class ElementSolver:
             f"no step was found from time {now}: {answer.outcome}{forced}",
             "check the equations there; more elements help where the solution is steep",
         )
-
-    def _forced(self, element_class, equations, most):
-        """The largest residuals where a step of the length ``most`` is forced."""
-        mpcc, length = element_class.mpcc, most / element_class.nominal
-        mpcc.solve(equations, length, length)
-        residuals = largest_residuals(self._model, self._times, equations, mpcc.values)
-        return f"; where one is forced, {residuals}" if residuals else ''
 
     def _jump_of_given_state(self, element):
         """A sentence on a state that is given and has another value right of the boundary than on it; empty without one."""

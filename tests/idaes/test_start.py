@@ -76,7 +76,7 @@ def test_a_failed_element_names_the_unit():
     m = moving(idaes_overflow.plant(), 8)
     idaes_overflow.specify(m)
     m.fs.cstr.outlet.flow_vol.fix(idaes_overflow.INFLOW + 4e-3)
-    with pytest.raises(pyomo_fesd.FesdError, match=r'(?s)from time 150.*where one is forced, largest residuals in fs'):
+    with pytest.raises(pyomo_fesd.FesdError, match=r'(?s)from time 150.*largest residuals in fs'):
         pyomo_fesd.simulate(m, m.fs.time, max_iterations=100)
 
 

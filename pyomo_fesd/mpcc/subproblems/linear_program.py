@@ -59,12 +59,13 @@ class Program:
         A.data[np.abs(A.data) < NOISE] = 0.0
         A.eliminate_zeros()
         largest = np.zeros(A.shape[0])
-        np.maximum.at(largest, A.indices, np.abs(A.data))
+        # a gradient may have overflown: HiGHS refuses what is no number
+        with np.errstate(invalid='ignore'):
+            np.maximum.at(largest, A.indices, np.abs(A.data))
         rows, size = 1.0 / np.where(largest > 0, largest, 1.0), np.abs(cost).max(initial=0.0)
         A.data *= rows[A.indices]
         factor = 1.0 / size if size > 0 else 1.0
         bounds = self.low * rows, self.high * rows, self.lower / self.reach, self.upper / self.reach
-        # a gradient may have overflown: HiGHS refuses what is no number
         with np.errstate(invalid='ignore'):
             return Program(cost * factor, A, *bounds, np.ones(len(cost)), self.binaries), rows, factor
 

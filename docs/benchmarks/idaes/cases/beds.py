@@ -79,7 +79,10 @@ def throttle(m):
     fs.gate = Disjunction(
         fs.time,
         rule=lambda b, t: (
-            Disjunction.Skip
+            [
+                [bed.solid_properties[t, near].mass_frac_comp['Fe2O3'] >= left],
+                [bed.solid_properties[t, near].mass_frac_comp['Fe2O3'] <= left],
+            ]
             if t == fs.time.first()
             else [
                 [bed.solid_properties[t, near].mass_frac_comp['Fe2O3'] >= left, bed.gas_inlet.flow_mol[t] == 20],

@@ -221,7 +221,7 @@ CASES = {
     'heater': Case(TESTS + 'test_heater.py: TestSaponification', heater, less_heat, flowsheet_time, (10,)),
     'two-phase heater': Case(TESTS + 'test_heater.py: TestBT_Generic', boiling_heater, more_heat, flowsheet_time, (10,)),
     'heat exchanger 1D': Case(
-        TESTS + 'test_heat_exchanger_1D.py: TestSaponification_cocurrent', exchanger_1d, more_coolant, flowsheet_time, (10, 20, 40)
+        TESTS + 'test_heat_exchanger_1D.py: TestSaponification_cocurrent', exchanger_1d, more_coolant, flowsheet_time, (10, 20)
     ),
     'lumped heat exchanger': Case(
         TESTS + 'test_heat_exchanger_lc.py: TestHXLCGeneric', lumped_capacitance, better_transfer, flowsheet_time, (5,)

@@ -95,6 +95,8 @@ class _Run:
         self.first, self.size = equations.first, np.abs(equations.first)
         count, n = len(equations.states), len(equations.names)
         numbers, ones = np.arange(count), np.ones(count)
+        # changes of rates count with those of the states
+        self._algebraic = np.setdiff1d(np.arange(n), [*equations.states, *equations.rates])
         pick = [sp.csr_matrix((ones, (numbers, where)), (count, n)) for where in (equations.states, equations.rates)]
         self._states, self._rates = sp.kron(sp.eye(3), pick[0]).tocsr(), sp.kron(A, pick[1]).tocsr()
         if 3 * n <= DENSE:
@@ -207,9 +209,9 @@ class _Run:
                 damping /= 2
             w = w - damping * change
             size = self._size_of(w, change, h)
-            algebra = (np.abs(change).max(axis=0) / (np.abs(w).max(axis=0) + 1e-9 * np.abs(w).max())).max()
+            algebra = (np.abs(change).max(axis=0) / (np.abs(w).max(axis=0) + 1e-9 * np.abs(w).max()))[self._algebraic]
             settled = size < 1e-12 or (fresh and size < 1e-8 and size > 0.3 * previous)
-            if damping == 1 and (exact or algebra < 1e-7) and settled:
+            if damping == 1 and (exact or algebra.max(initial=0.0) < 1e-7) and settled:
                 return w
             if damping < 1 or previous == np.inf or size > CONTRACTION * previous:
                 solve = None
