@@ -44,10 +44,8 @@ class _Condition:
 def unknown_first_modes(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
     """Yield a message for each Disjunction whose conditions in the first element do not hold at the first time."""
     times, point = TimeIndex(wrt), moving_grids(model)[wrt].grid.elements[0].points[0]
-    for name, by_label, remedy in (*_of_disjunctions(model, times), *_of_jumping_functions(model, times)):
-        if wrt.first() in by_label:
-            continue
-        for condition in by_label.get(point, ()):
+    for name, conditions, remedy in (*_of_disjunctions(model, times, point), *_of_jumping_functions(model, times, point)):
+        for condition in conditions:
             begin = _at_first_time(condition.body, times)
             if begin is not None and _violated(condition, begin) and _determined(begin, model, times):
                 yield (
@@ -57,11 +55,12 @@ def unknown_first_modes(model: Block, wrt: ContinuousSet, functions: list[Switch
                 break
 
 
-def _of_disjunctions(model, times) -> Iterator[tuple]:
-    """``(name, {label: conditions of the active modes}, remedy)`` of every Disjunction."""
+def _of_disjunctions(model, times, point) -> Iterator[tuple]:
+    """``(name, conditions of the active modes at a point, remedy)`` of every Disjunction that is not stated at the first time."""
     multipliers = all_switched_systems(model).multipliers
     for name, by_time in times.families(model.component_data_objects(Disjunction, descend_into=(Block, Disjunct))).items():
-        yield strip_time(name), {t: list(_regions(d, multipliers)) for t, d in by_time.items()}, REGIONS
+        if times.wrt.first() not in by_time and point in by_time:
+            yield strip_time(name), _regions(by_time[point], multipliers), REGIONS
 
 
 def _regions(disjunction, multipliers):
@@ -73,15 +72,16 @@ def _regions(disjunction, multipliers):
                     yield _Condition(con.body, con.lower, con.upper)
 
 
-def _of_jumping_functions(model, times) -> Iterator[tuple]:
+def _of_jumping_functions(model, times, point) -> Iterator[tuple]:
     """The same for the surfaces of functions that jump."""
-    systems, by_label = all_switched_systems(model), {}
+    systems, steps = all_switched_systems(model), {}
     names = ComponentMap((surface.variable, surface.name) for surface in systems.surfaces)
     for step in systems.steps:
         if step.nu in names:
-            by_label.setdefault(names[step.nu], {})[times.time(step.nu)] = list(_sides(step.c, step.nu.value))
-    for name, conditions in by_label.items():
-        yield name, conditions, FUNCTION
+            steps.setdefault(names[step.nu], {})[times.time(step.nu)] = step
+    for name, by_time in steps.items():
+        if times.wrt.first() not in by_time and point in by_time:
+            yield name, _sides(by_time[point].c, by_time[point].nu.value), FUNCTION
 
 
 def _sides(c, nu):

@@ -28,9 +28,9 @@ TRIES = (
     {'lpec': 'full', 'starts': 6},
 )
 #: Where a solution can be followed for less than this part of a step, and no step is found, other searches and starts do not help.
+ENDS = 1e-3
 #: A step of length zero is a local solution of its own where a switch lies on the left boundary.  Then lengths of at least these
 #: parts of the aim are asked for; a step is longer by the last part, else the bound holds it.
-ENDS = 1e-3
 LEAST, BEYOND, LONGER = (1e-2, 1e-4), {'lpec': 'full', 'relaxation': 'elastic'}, 1e-3
 
 
