@@ -9,7 +9,6 @@ import numpy as np
 
 from pyomo_fesd.mpcc.subproblems.inserted_part import InsertedPart
 from pyomo_fesd.mpcc.subproblems.lpec import sizes_of
-from pyomo_fesd.mpcc.subproblems.parts import stacked
 
 #: Extents of the copy, relative to the extent of its part, and their ratio.
 EXTENTS, RATIO = (1e-2, 1e-3), 0.1
@@ -131,7 +130,7 @@ class Copy:
     def _missed(self, w):
         """By how much the copy misses the bounds of its rows and sides, and of its variables, relative to their terms."""
         low, high = self._distances(w)
-        terms = np.maximum(1.0, abs(stacked(self._c.gradients(w))[self.rows]) @ np.abs(w))
+        terms = np.maximum(1.0, abs(self._c.stacked_jacobian(w)[self.rows]) @ np.abs(w))
         own, inner = self._c, self._inner
         of_variables = np.maximum(own.lbx[inner] - w[inner], w[inner] - own.ubx[inner]) / sizes_of(w[inner])
         return np.concatenate([np.maximum(low, -high) / terms, of_variables])

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import nnls
 
-from pyomo_fesd.mpcc.subproblems.parts import stacked
+from pyomo_fesd.mpcc.compile import with_entries
 
 #: Newton steps; residual of the rows, each over its largest entry, and last step, at which they end.
 STEPS, RESIDUAL, LAST_STEP = 30, 1e-10, 1e-7
@@ -28,20 +28,19 @@ SINGULAR = 1e-13
 
 
 class InsertedPart:
-    """The equations of part ``k`` at one assignment.
+    """The equations of a part at one assignment.
 
     Parameters
     ----------
     c : MpccFunctions
     sides : Sides
     parts : Parts
-    k : int
-    zero : int array (q)
-        zero sides of all pairs; only those of the part count
     columns : int array
         variables to determine
     rows : int array
         stacked numbers of the rows among which the equations are
+    zero : int array (q)
+        zero sides of all pairs; only those among the rows count
     """
 
     def __init__(self, c, sides, parts, columns, rows, zero):
@@ -60,7 +59,7 @@ class InsertedPart:
         w[fixed] = at
         free = np.setdiff1d(self._columns, fixed)
         for _ in range(STEPS):
-            J = stacked(self._c.gradients(w))[rows]
+            J = self._c.stacked_jacobian(w)[rows]
             residual = (self._values(w) - self._low)[rows]
             scale = _largest(J)
             A = (sparse.diags(1 / scale) @ J)[:, free].toarray()
@@ -78,16 +77,16 @@ class InsertedPart:
         w[fixed] = at
         free, other = np.setdiff1d(self._columns, fixed), w.copy()
         other[free] += np.random.default_rng(SEED).uniform(0.1, 1.0, len(free))
-        A, B = (stacked(self._c.gradients(at))[rows][:, free].toarray() for at in (w, other))
+        A, B = (self._c.stacked_jacobian(at)[rows][:, free].toarray() for at in (w, other))
         linear = np.abs(A - B).max(axis=1, initial=0.0) <= EXACT
-        terms = np.maximum(1.0, abs(stacked(self._c.gradients(w))[rows]) @ np.abs(w))
+        terms = np.maximum(1.0, abs(self._c.stacked_jacobian(w)[rows]) @ np.abs(w))
         A, residual = A[linear] / terms[linear, None], ((self._values(w) - self._low)[rows] / terms)[linear]
         left = residual - A @ np.linalg.lstsq(A, residual, rcond=SINGULAR)[0] if len(A) else residual
         return bool(np.abs(left).max(initial=0.0) > CONTRADICTION)
 
     def slopes(self, w, row):
         """Derivatives of a row where the equations hold, by all variables that they do not determine."""
-        J = stacked(self._c.gradients(w))
+        J = self._c.stacked_jacobian(w)
         rows, fixed, _ = self._equations(w)
         free, found = np.setdiff1d(self._columns, fixed), J[row].toarray().ravel()
         scale = sparse.diags(1 / _largest(J[rows]))
@@ -98,7 +97,7 @@ class InsertedPart:
 
     def left_free(self, w, gradient):
         """The part of a gradient that the equations leave: its distance from the space that their gradients span."""
-        J = stacked(self._c.gradients(w))
+        J = self._c.stacked_jacobian(w)
         rows, fixed, _ = self._equations(w, all_free=True)
         basis = (sparse.diags(1 / _largest(J[rows])) @ J[rows]).toarray()
         some = np.flatnonzero(np.any(basis != 0.0, axis=0) | (gradient != 0.0))
@@ -112,7 +111,7 @@ class InsertedPart:
 
     def _equations(self, w, all_free=False):
         """Rows that are equations of variables to determine, or of any; variables that are fixed, and their values."""
-        J = stacked(self._c.gradients(w))
+        J = self._c.stacked_jacobian(w)
         rows = self._rows
         equations = rows[self._low[rows] == self._high[rows]].tolist()
         fixed = {}
@@ -135,7 +134,9 @@ class InsertedPart:
         columns, inside = entries.indices, np.zeros(J.shape[1], dtype=bool)
         inside[columns] = True
         support = np.diff(J.indptr[: m + 1])
-        among = np.flatnonzero((support > 0) & (_ones(J[:m]) @ inside.astype(float) == support) & np.isfinite(self._low[:m]))
+        among = np.flatnonzero(
+            (support > 0) & (with_entries(J[:m], np.ones(J[:m].nnz)) @ inside.astype(float) == support) & np.isfinite(self._low[:m])
+        )
         among = among[self._low[among] < self._high[among]]
         lower, upper = (columns[np.isfinite(bound[columns])] for bound in (self._c.lbx, self._c.ubx))
         unit = sparse.identity(J.shape[1], format='csr')[:, columns]
@@ -172,9 +173,3 @@ class InsertedPart:
 def _largest(J):
     found = abs(J).max(axis=1).toarray().ravel() if J.shape[0] else np.zeros(0)
     return np.where(found > 0, found, 1.0)
-
-
-def _ones(matrix):
-    found = matrix.copy()
-    found.data = np.ones_like(found.data)
-    return found

@@ -173,6 +173,8 @@ class Insertions:
         base = replace(base, program=joined.unfixed(base.program, *self._lpec.box(w, unfixed, base.program.reach, beyond=True)))
         limits = copy.limits(self._tolerances.radius, joined.fixed_by_following)
         points = w, beside, copy.limit
-        at = joined.linearised(base, [joined.rows_of(self._c.gradients(at)) for at in points], credit, limits, copy.fixed)
+        at = joined.linearised(
+            base, [(self._c.gradients(at)[0], self._c.stacked_jacobian(at)) for at in points], credit, limits, copy.fixed
+        )
         descent = Descent(at.program, lambda: [(cost, A.T.dot) for cost, A in joined.changes(*map(self._lpec.changes, points))])
         return self._lpec.best(sets, at, descent, True)

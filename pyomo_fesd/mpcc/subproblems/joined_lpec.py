@@ -15,7 +15,7 @@ from scipy import sparse
 
 from pyomo_fesd.mpcc.subproblems.linear_program import Program
 from pyomo_fesd.mpcc.subproblems.lpec import Linearised, row_places
-from pyomo_fesd.mpcc.subproblems.parts import SHARED, stacked
+from pyomo_fesd.mpcc.subproblems.parts import SHARED
 
 
 class JoinedLpec:
@@ -37,11 +37,6 @@ class JoinedLpec:
         self._follows = parts.of_row[self._program_rows] == following
         self._of_part = parts.of_variable == following
         self._shares = parts.of_row[self._program_rows] == SHARED
-
-    @staticmethod
-    def rows_of(gradients):
-        """Gradient of the objective, and all rows."""
-        return gradients[0], stacked(gradients)
 
     def with_following(self, base, other):
         """The LPEC with the rows and variables of the part after the copy linearised at another point."""

@@ -10,7 +10,8 @@ Leaves: numbers of parts by variable, row and pair.
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
+
+from pyomo_fesd.mpcc.compile import with_entries
 
 #: Instead of the number of a part: of none, and of several.
 NONE, SHARED = -1, -2
@@ -19,7 +20,7 @@ NONE, SHARED = -1, -2
 class Parts:
     """The parts of one compiled MPCC.
 
-    Rows are numbered as in ``stacked``: own rows (m), G (q), H (q), decisions.
+    Rows are numbered as in ``stacked_jacobian``: own rows (m), G (q), H (q), decisions.
     """
 
     def __init__(self, c):
@@ -59,9 +60,8 @@ class Parts:
     @cached_property
     def pattern(self):
         """Ones where a row contains a variable."""
-        found = stacked(self._c.gradients(self._c.x0))
-        found.data = np.ones_like(found.data)
-        return found
+        J = self._c.stacked_jacobian(self._c.x0)
+        return with_entries(J, np.ones(J.nnz))
 
     @cached_property
     def of_row(self):
@@ -108,8 +108,3 @@ class Parts:
         one, other = parts[-2:]
         adjacent = len(parts) == 2 and self.next(one) == other
         return other if adjacent and self._is_last[columns[owners == one]].all() else SHARED
-
-
-def stacked(gradients):
-    """All rows: own, G, H, decisions."""
-    return sparse.vstack(gradients[1:], format='csr')
