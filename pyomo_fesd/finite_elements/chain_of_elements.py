@@ -35,7 +35,7 @@ def add_chain(moving: MovingGrid) -> None:
         tuple(
             Part(
                 extent=moving.r[e.n],
-                own=(*(v for f in families for t, v in f.items() if t in e.own_labels), *generated[e.n], moving.r[e.n]),
+                own=(*(f[t] for f in families for t in e.own_labels if t in f), *generated[e.n], moving.r[e.n]),
                 gate=tuple(gates[e.n]),
                 ends=tuple((f[e.left], f[e.right]) for f in families if e.left in f and e.right in f),
             )
@@ -51,7 +51,7 @@ def _families_over_time(moving) -> list[dict]:
         ComponentSet() if moving.held is None else ComponentSet(v for c in moving.held.values() for v in identify_variables(c.body))
     )
     families = times.families(model.component_data_objects(Var, descend_into=(Block, Disjunct))).values()
-    return [dict(sorted(family.items())) for family in families if not any(v in held for v in family.values())]
+    return [family for family in families if not any(v in held for v in family.values())]
 
 
 def _generated(moving):
