@@ -6,8 +6,8 @@ written by ``fesd.finite_elements``; ``held_controls`` reads from it) and ``homo
 ``private_data`` keeps them on blocks, ``generated`` recognises generated blocks, ``keywords`` refuses values outside of their
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
-``evaluation``, ``gradient``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``units_of_measure``, ``expression_key``
-and ``phase`` are tools. This room imports from no other.
+``evaluation``, ``gradient``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``units_of_measure``,
+``expression_key``, ``node_search`` and ``phase`` are tools. This room imports from no other.
 """
 
 from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
@@ -57,6 +57,7 @@ from pyomo_fesd.core.interpolation import interpolation_weights
 from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible
 from pyomo_fesd.core.keywords import check_keywords, read_keywords
 from pyomo_fesd.core.moving_grid import MovingGrid, Split, add_moving_grid, moving_grids
+from pyomo_fesd.core.node_search import contains_node
 from pyomo_fesd.core.parts import Part
 from pyomo_fesd.core.phase import phase
 from pyomo_fesd.core.positive_part import add_positive_part, declare_positive_part

@@ -12,9 +12,8 @@ from collections import defaultdict
 from collections.abc import Iterator
 
 from pyomo.common.collections import ComponentSet
-from pyomo.core import Block, Var
+from pyomo.core import Var
 from pyomo.core.expr.visitor import identify_variables
-from pyomo.gdp import Disjunct
 
 from pyomo_fesd.core import MovingGrid, Part, TimeIndex, homotopy_hints, index_sets
 
@@ -23,14 +22,14 @@ ELEMENT, BOUNDARIES = 'element', ('left', 'boundary')
 LATER = {ELEMENT: 0} | dict.fromkeys(BOUNDARIES, 1)
 
 
-def add_chain(moving: MovingGrid) -> None:
-    """Add the chain of the elements."""
+def add_chain(moving: MovingGrid, families: list[dict]) -> None:
+    """Add the chain of the elements; ``families`` are all variables over time, each as {label: data}."""
     if moving.hysteresis is not None or (moving.state_jumps is not None and moving.state_jumps.laws):
         return
     generated, gates = _generated(moving)
     if generated is None:
         return
-    families = _families_over_time(moving)
+    families = _varying_inside_stages(families, moving)
     homotopy_hints(moving.block).chains.append(
         tuple(
             Part(
@@ -44,13 +43,11 @@ def add_chain(moving: MovingGrid) -> None:
     )
 
 
-def _families_over_time(moving) -> list[dict]:
-    """Each variable over time as {label: data}, without controls that are constant on a control stage: elements share these."""
-    model, times = moving.block.model(), TimeIndex(moving.wrt)
-    held = (
-        ComponentSet() if moving.held is None else ComponentSet(v for c in moving.held.values() for v in identify_variables(c.body))
-    )
-    families = times.families(model.component_data_objects(Var, descend_into=(Block, Disjunct))).values()
+def _varying_inside_stages(families, moving) -> list[dict]:
+    """Without controls that are constant on a control stage: elements share these."""
+    if moving.held is None:
+        return families
+    held = ComponentSet(v for c in moving.held.values() for v in identify_variables(c.body))
     return [family for family in families if not any(v in held for v in family.values())]
 
 

@@ -136,7 +136,7 @@ class FiniteElements(Transformation):
             hold_controls(moving, config.piecewise_constant)
             multiply_derivatives(moving)
             _add_switching(moving, switching, complementarities, continuity, config)
-            _relate_sizes(moving)
+            _relate_variables(moving, switching)
 
     def get_src_complementarity(self, pair):
         """Return the conditions over time that an aggregated pair sums up."""
@@ -262,13 +262,6 @@ def _read_complementarities(moving, switching, continuity):
     return found
 
 
-def _relate_sizes(moving):
-    """A quantity over time has one size, by which the solver scales it."""
-    variables = moving.block.model().component_data_objects(Var, descend_into=(Block, Disjunct))
-    families = TimeIndex(moving.wrt).families(variables)
-    homotopy_hints(moving.block).alike += [tuple(by_time.values()) for by_time in families.values()]
-
-
 def _add_switching(moving, switching, complementarities, continuity, config):
     """Write the pairs of all that switches, and the conditions on the lengths."""
     add_state_jumps(moving, switching.jumps, switching.contacts)
@@ -289,4 +282,12 @@ def _add_switching(moving, switching, complementarities, continuity, config):
     add_neighbour_branches(moving)
     add_coincidences(moving)
     add_arrivals(moving)
-    add_chain(moving)
+
+
+def _relate_variables(moving, switching):
+    """Tell the solver which variables are one quantity over time, and have one size, and which belong to one element."""
+    variables = moving.block.model().component_data_objects(Var, descend_into=(Block, Disjunct))
+    families = list(TimeIndex(moving.wrt).families(variables).values())
+    homotopy_hints(moving.block).alike += [tuple(family.values()) for family in families]
+    if switching:
+        add_chain(moving, families)

@@ -10,9 +10,12 @@ from pyomo.common.numeric_types import native_types
 from pyomo.core.expr import numeric_expr as ne
 from pyomo.core.expr.visitor import StreamBasedExpressionVisitor
 
+from pyomo_fesd.core import contains_node
 from pyomo_fesd.smoothing.linear_terms import LinearCombination
-from pyomo_fesd.smoothing.patterns import guards, match
+from pyomo_fesd.smoothing.patterns import RULES, guards, match
 
+#: Classes of nodes that may be a pattern.
+PATTERN_NODES = frozenset(RULES)
 #: Types that are not entered; ``Expr_if`` jumps, and its condition is not a number.
 CLOSED = {*native_types, ne.Expr_ifExpression}
 
@@ -91,7 +94,8 @@ class PatternReader(_Walker):
         """
         self._begin(replaced)
         self._matches, self._named = [], []
-        self.walk_expression(expr)
+        if contains_node(expr, PATTERN_NODES):
+            self.walk_expression(expr)
         return self._matches, self._named
 
     def _takes(self, found):

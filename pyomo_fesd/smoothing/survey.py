@@ -50,7 +50,7 @@ class Survey:
         """The matches and the uses of named Expressions in one source; no uses where the source stays as it is."""
         readings = [self._reader.read(e, self.replaced_in(source)) for e in expressions(source)]
         matches, uses = (list(chain.from_iterable(found)) for found in zip(*readings)) if readings else ([], [])
-        return matches, [] if self._excluded(source) or _in_disjunct(source) else uses
+        return matches, [] if uses and (self._excluded(source) or _in_disjunct(source)) else uses
 
     def replaced_in(self, source):
         """Return the function (Match, guarded) -> bool that holds for the matches to replace in ``source``."""

@@ -13,20 +13,16 @@ Leaves: the components of the rules and the generated constraints; the functions
 Does not apply: where neither the component nor the arguments are over time.
 """
 
-from functools import cache
-
 from pyomo.common.numeric_types import native_types
 from pyomo.contrib.piecewise import PiecewiseLinearExpression, PiecewiseLinearFunction
 from pyomo.core import Block, Constraint, Objective
-from pyomo.core.base.expression import NamedExpressionData
 from pyomo.core.expr import Expr_ifExpression, identify_variables
-from pyomo.core.expr.base import ExpressionBase
 from pyomo.core.expr.visitor import ExpressionReplacementVisitor
 from pyomo.dae import Integral
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import GENERATED, FesdError, discretised, is_discretisation_equation, is_generated
+from pyomo_fesd.core import GENERATED, FesdError, contains_node, discretised, is_discretisation_equation, is_generated
 from pyomo_fesd.dcs.piecewise import expr_if, multivariate, univariate
 from pyomo_fesd.dcs.piecewise.replaced_constraints import deactivate, replace_constraint
 from pyomo_fesd.dcs.piecewise.rewrite_context import RewriteContext, SharedContext
@@ -40,6 +36,7 @@ def _call(node, args, context):
 
 #: node of an expression -> rule(node, args, context) that returns the expression to replace it
 RULES = {PiecewiseLinearExpression: _call, Expr_ifExpression: expr_if.call}
+NODES = frozenset(RULES)
 EVERYWHERE = (Block, Disjunct)
 #: Beginning of the names of the blocks of contrib.piecewise's transformations.
 WRITTEN_BY_PYOMO = '_pyomo_contrib_pw_linear'
@@ -179,28 +176,8 @@ def _is_ours(component):
 
 def _contains(source, wrt):
     """Whether a component contains a piecewise function."""
-    waiting = _complementarity_sides(source) if source.ctype is Complementarity else [source.expr]
-    while waiting:
-        node = waiting.pop()
-        sort = _sort(node.__class__)
-        if sort is _RULE:
-            return True
-        if sort is _OPERATION or (sort is _NAMED and not _waits(node, wrt)):
-            waiting.extend(node.args)
-    return False
-
-
-_LEAF, _OPERATION, _NAMED, _RULE = range(4)
-
-
-@cache
-def _sort(cls):
-    """How a class of nodes is searched: this is asked for every node of every constraint."""
-    if cls in RULES:
-        return _RULE
-    if issubclass(cls, NamedExpressionData):
-        return _NAMED
-    return _OPERATION if issubclass(cls, ExpressionBase) else _LEAF
+    sides = _complementarity_sides(source) if source.ctype is Complementarity else [source.expr]
+    return any(contains_node(side, NODES, enter=lambda named: not _waits(named, wrt)) for side in sides)
 
 
 def _complementarity_sides(condition):

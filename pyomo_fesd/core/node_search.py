@@ -1,0 +1,43 @@
+"""Ask whether an expression contains a node of some classes, quicker than a visitor of Pyomo can.
+
+Takes: an expression, and classes of nodes.
+Leaves: nothing.
+"""
+
+from functools import cache
+
+from pyomo.core.base.expression import NamedExpressionData
+from pyomo.core.expr.base import ExpressionBase
+
+_LEAF, _OPERATION, _NAMED, _SOUGHT = range(4)
+
+
+def contains_node(expr, sought: frozenset, enter=None) -> bool:
+    """Whether ``expr`` is or contains a node whose class is in ``sought``.
+
+    Parameters
+    ----------
+    sought : frozenset of classes
+        of nodes other than named Expressions
+    enter : function ExpressionData -> bool, optional
+        whether to search in this named Expression.  Default: a named Expression counts as found.
+    """
+    waiting = [expr]
+    while waiting:
+        node = waiting.pop()
+        sort = _sort(node.__class__, sought)
+        if sort is _SOUGHT or (sort is _NAMED and enter is None):
+            return True
+        if sort is _OPERATION or (sort is _NAMED and enter(node)):
+            waiting.extend(node.args)
+    return False
+
+
+@cache
+def _sort(cls, sought):
+    """How a class of nodes is searched: this is asked for every node of every constraint."""
+    if cls in sought:
+        return _SOUGHT
+    if issubclass(cls, NamedExpressionData):
+        return _NAMED
+    return _OPERATION if issubclass(cls, ExpressionBase) else _LEAF
