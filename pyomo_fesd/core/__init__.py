@@ -7,7 +7,7 @@ written by ``fesd.finite_elements``; ``held_controls`` reads from it) and ``homo
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
 ``evaluation``, ``gradient``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``units_of_measure``,
-``expression_key``, ``node_search`` and ``phase`` are tools. This room imports from no other.
+``expression_key``, ``node_search``, ``own_data`` and ``phase`` are tools. This room imports from no other.
 """
 
 from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
@@ -58,6 +58,7 @@ from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, i
 from pyomo_fesd.core.keywords import check_keywords, read_keywords
 from pyomo_fesd.core.moving_grid import MovingGrid, Split, add_moving_grid, moving_grids
 from pyomo_fesd.core.node_search import contains_node
+from pyomo_fesd.core.own_data import own_data
 from pyomo_fesd.core.parts import Part
 from pyomo_fesd.core.phase import phase
 from pyomo_fesd.core.positive_part import add_positive_part, declare_positive_part

@@ -11,7 +11,16 @@ from pyomo.common.dependencies import pandas as pd
 from pyomo.core import Block, Expression, Var, value
 from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import TimeIndex, derivatives, find_continuous_set, is_generated, moving_grids, strip_time, value_or_nan
+from pyomo_fesd.core import (
+    TimeIndex,
+    derivatives,
+    find_continuous_set,
+    is_generated,
+    moving_grids,
+    own_data,
+    strip_time,
+    value_or_nan,
+)
 from pyomo_fesd.results.complementarity_modes import complementarity_positions
 from pyomo_fesd.results.disjunction_modes import disjunction_modes
 from pyomo_fesd.results.physical_time import elements_if_any, physical_time
@@ -85,10 +94,9 @@ def trajectory(model: Block, wrt: ContinuousSet | None = None) -> pd.DataFrame:
 def columns_over_time(model: Block, wrt: ContinuousSet) -> Iterator[Column]:
     """Yield the columns of a trajectory: variables and expressions, then the multipliers of modes."""
     times = TimeIndex(wrt)
-    found = model.component_objects((Var, Expression), descend_into=Block)
-    datas = (data for v in found if not v.is_reference() and not is_generated(v) for data in v.values())
-    for name, by_time in times.families(datas).items():
-        yield Column(strip_time(name), None, by_time)
+    for name, by_time in times.families(own_data(model, (Var, Expression), descend_into=Block)).items():
+        if not is_generated(next(iter(by_time.values()))):
+            yield Column(strip_time(name), None, by_time)
     systems = disjunction_modes(model, times) | complementarity_positions(model, wrt, times, elements_if_any(wrt))
     for name, modes in systems.items():
         for mode, weights in modes.items():

@@ -46,7 +46,7 @@ def _without(known, waiting):
 def _scalar_equations(model, times):
     """Equations of the user without a time of their own that contain variables over time or follow from such."""
     for c in model.component_data_objects(Constraint, active=True, descend_into=Block):
-        if c.equality and not is_generated(c) and times.time(c) is None:
+        if times.time(c) is None and c.equality and not is_generated(c):
             yield c
 
 

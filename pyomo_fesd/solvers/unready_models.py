@@ -31,10 +31,8 @@ def refuse_unready(model: Block, solver: str) -> None:
         state jumps on elements that do not move, and for a first mode outside of its region
     """
     refuse_no_model(model, solver)
-    for ctype, fix in REFUSED.items():
-        found = next(model.component_data_objects(ctype, active=True, descend_into=Block), None)
-        if found is not None:
-            raise FesdError(found, f"an active {ctype.__name__}, which {solver} does not handle", fix)
+    if next(model.component_data_objects(tuple(REFUSED), active=True, descend_into=Block), None) is not None:
+        _refuse_first(model, solver)
     for integral in model.component_objects(Integral, active=True, descend_into=Block):
         _refuse_stale(integral, solver)
     for v in model.component_data_objects(Var, active=True, descend_into=Block):
@@ -46,6 +44,14 @@ def refuse_unready(model: Block, solver: str) -> None:
             raise FesdError(component, f"{kind} on a grid whose elements do not move", "apply fesd.finite_elements first")
     _refuse_half_scaled(model, solver)
     refuse_first_modes(model)
+
+
+def _refuse_first(model, solver):
+    """Refuse the first component that must not be active, in the order of ``REFUSED``."""
+    for ctype, fix in REFUSED.items():
+        found = next(model.component_data_objects(ctype, active=True, descend_into=Block), None)
+        if found is not None:
+            raise FesdError(found, f"an active {ctype.__name__}, which {solver} does not handle", fix)
 
 
 def _refuse_half_scaled(model, solver):

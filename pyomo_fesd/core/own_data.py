@@ -1,0 +1,17 @@
+"""Walk over the data of a model where each is declared: a Reference only names data of others again, and reads them slowly.
+
+Takes: a block.
+Leaves: nothing.
+Does not apply: where the user has named components, which may be References.
+"""
+
+from collections.abc import Iterator
+
+from pyomo.core import Block
+
+
+def own_data(block: Block, ctype, descend_into) -> Iterator:
+    """Yield the data of the components of type ``ctype`` that are no References; the parameters are those of Pyomo's walks."""
+    for component in block.component_objects(ctype, descend_into=descend_into):
+        if not component.is_reference():
+            yield from component.values()
