@@ -6,7 +6,7 @@ written by ``fesd.finite_elements``; ``held_controls`` reads from it) and ``homo
 ``private_data`` keeps them on blocks, ``generated`` recognises generated blocks, ``keywords`` refuses values outside of their
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
-``evaluation``, ``gradient``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``units_of_measure``,
+``evaluation``, ``gradient``, ``gradients``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``units_of_measure``,
 ``expression_key``, ``node_search``, ``own_data`` and ``phase`` are tools. This room imports from no other.
 """
 
@@ -24,6 +24,7 @@ from pyomo_fesd.core.evaluation import (
 from pyomo_fesd.core.expression_key import Swap, component_key, exchanged, expression_key, prefix_tokens
 from pyomo_fesd.core.generated import GENERATED, is_generated, public_name, source_name
 from pyomo_fesd.core.gradient import gradient
+from pyomo_fesd.core.gradients import gradients
 from pyomo_fesd.core.grid import (
     ONE_ELEMENT_SCHEMES,
     Element,

@@ -38,11 +38,22 @@ def gradient(expression, variables) -> list[float]:
 
 
 def _by_casadi(expression, variables):
+    now = [np.nan if v.value is None else float(v.value) for v in variables]
+    return slopes_by_casadi(expression, variables)(now).full().ravel().tolist()
+
+
+def slopes_by_casadi(expression, variables) -> ca.Function:
+    """Return the gradient of an expression as a function of the values of ``variables``; the numbers in it are those of now.
+
+    Raises
+    ------
+    NotImplementedError
+        for an operation that casadi does not have
+    """
     symbols = ca.SX.sym('x', len(variables))
     at = {id(v): symbols[k] for k, v in enumerate(variables)}
     slopes = ca.gradient(ca.SX(_symbolic(expression, at)), symbols)
-    now = [np.nan if v.value is None else float(v.value) for v in variables]
-    return [float(slope) for slope in ca.Function('slopes', [symbols], [slopes])(now).full().ravel()]
+    return ca.Function('slopes', [symbols], [ca.densify(slopes)])
 
 
 def _symbolic(expression, at):

@@ -18,7 +18,7 @@ from pyomo.core import Block, Constraint, Suffix, Var
 from pyomo.core.base.suffix import SuffixFinder
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import gradient, is_generated
+from pyomo_fesd.core import gradients, is_generated
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -42,10 +42,10 @@ def scale_by_values(block, least: float = 1e-3) -> int:
     free = (v for v in variables if v.value and not v.fixed)
     new = ComponentMap((v, 1 / max(abs(v.value), least)) for v in _unscaled(free, find))
     factors = {id(v): new.get(v) or find(v) or 1.0 for v in variables}
-    equations = _unscaled(block.component_data_objects(Constraint, active=True, descend_into=Block), find)
-    found = {c: _equation_factor(c, factors) for c in equations}
-    _warn_without_value([c for c, factor in found.items() if isnan(factor)])
-    new.update((c, factor) for c, factor in found.items() if factor > 0)
+    equations = list(_unscaled(block.component_data_objects(Constraint, active=True, descend_into=Block), find))
+    found = [_equation_factor(*slopes, factors) for slopes in gradients(c.body for c in equations)]
+    _warn_without_value([c for c, factor in zip(equations, found) if isnan(factor)])
+    new.update((c, factor) for c, factor in zip(equations, found) if factor > 0)
     for component, factor in new.items():
         _set_factor(component, factor)
     return len(new)
@@ -55,10 +55,8 @@ def _unscaled(components, find):
     return (c for c in components if find(c) is None and not is_generated(c))
 
 
-def _equation_factor(c, factors):
+def _equation_factor(variables, slopes, factors):
     """The factor that scales the largest entry of an equation's gradient in scaled variables to 1; 0 for none, NaN if undefined."""
-    variables = list(identify_variables(c.body, include_fixed=True))
-    slopes = gradient(c.body, variables) if variables else []
     scaled = [abs(slope) / factors.get(id(v), 1.0) for slope, v in zip(slopes, variables) if not v.fixed]
     if any(map(isnan, scaled)):
         return nan
