@@ -102,6 +102,6 @@ from pyomo_fesd.core.time_index import (
     strip_time,
 )
 from pyomo_fesd.core.turns import REDIRECTION, TRANSFORMATION
-from pyomo_fesd.core.units_of_measure import in_unit_of, time_unit, unit_of, without_unit
+from pyomo_fesd.core.units_of_measure import divided_by, in_unit_of, time_unit, unit_of, without_unit
 from pyomo_fesd.core.version import __version__
 from pyomo_fesd.core.withheld_messages import withheld_messages

@@ -23,7 +23,11 @@ def unit_of(expr):
 
 def without_unit(expr):
     """Return ``expr`` divided by its unit; itself where it has none."""
-    unit = unit_of(expr)
+    return divided_by(expr, unit_of(expr))
+
+
+def divided_by(expr, unit):
+    """Return ``expr`` in multiples of ``unit``, which may be None."""
     return expr if unit is None else expr / unit
 
 

@@ -17,7 +17,7 @@ from math import prod
 from pyomo.core import Block, Constraint, Expression, quicksum
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import BranchConstraint, MovingGrid, Penalty, homotopy_hints, without_unit
+from pyomo_fesd.core import BranchConstraint, MovingGrid, Penalty, divided_by, homotopy_hints, unit_of
 from pyomo_fesd.finite_elements.contacts import impulse_activity
 from pyomo_fesd.finite_elements.state_jumps import no_jump
 
@@ -57,10 +57,8 @@ def add_equilibration(moving: MovingGrid, mode: str, rho: float) -> None:
     independent = [c for c in moving.complementarities if not c.follows]
     block.activity = moving.activity = Expression(block.condition, block.element)
     for condition in independent:
-        for element in moving.grid.elements:
-            if condition.points(element):
-                G, H = (without_unit(quicksum(condition.values(element, side))) for side in (0, 1))
-                block.activity[condition.name, element.n] = G / (G + H + TINY)
+        for n, activity in _activities(condition, moving.grid.elements):
+            block.activity[condition.name, n] = activity
     block.eta = moving.eta = Expression(block.element)
     block.equal_length = Constraint(block.element)
     block.equilibration = moving.equilibration = Complementarity(block.element)
@@ -72,6 +70,17 @@ def add_equilibration(moving: MovingGrid, mode: str, rho: float) -> None:
     block.equal_length.deactivate()
     block.deviation = Expression(expr=quicksum((r - 1) ** 2 for r in block.r.values() if not r.fixed))
     MODES[mode](block, rho)
+
+
+def _activities(condition, elements):
+    """``(n, G/(G + H))`` with the sums G and H of a condition's sides over each element; what has a unit has it in all of them."""
+    units = None
+    for element in elements:
+        if condition.points(element):
+            sums = [quicksum(condition.values(element, side)) for side in (0, 1)]
+            units = units or list(map(unit_of, sums))
+            G, H = map(divided_by, sums, units)
+            yield element.n, G / (G + H + TINY)
 
 
 def _unchanged(moving, independent, e, f):
