@@ -85,14 +85,14 @@ def draw_all(table, folder):
 def work_precision(axis, rows, curves):
     """Error against time: all runs as faint points, the front of each method as a labelled line."""
     problem, ends = rows['problem'].iloc[0], []
-    axis.set(xscale='log', yscale='log', xlabel='time from model to solution (s)', ylabel=DRAWN[problem])
+    axis.set(xscale='log', yscale='log', xlabel='CPU time from model to solution (s)', ylabel=DRAWN[problem])
     for name, curve in curves.items():
         own = rows[rows['method'].isin(curve.methods)]
         times, errors = front(own)
         if not len(times):
             continue
         claimed = own[own['claimed']]
-        axis.plot(claimed['total'], claimed['error'].clip(lower=ROUND_OFF), curve.marker, color=curve.colour, ms=3, alpha=0.3)
+        axis.plot(claimed['cpu'], claimed['error'].clip(lower=ROUND_OFF), curve.marker, color=curve.colour, ms=3, alpha=0.3)
         axis.plot(times, errors, curve.line, marker=curve.marker, color=curve.colour, ms=5, lw=1.4)
         ends.append((name, curve.colour, times[-1], errors[-1]))
     axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))

@@ -7,7 +7,7 @@ from benchmarks.common.fits import exponent
 ROUND_OFF = 1e-15
 
 
-def front(rows, clock='total'):
+def front(rows, clock='cpu'):
     """Times and errors of the claimed runs that no other run beats in both, in the order of time."""
     rows = rows[rows['claimed'] & rows['error'].notna()].sort_values([clock, 'error'])
     errors = np.maximum(rows['error'].to_numpy(float), ROUND_OFF)
@@ -15,7 +15,7 @@ def front(rows, clock='total'):
     return rows[clock].to_numpy(float)[best], errors[best]
 
 
-def time_at(rows, error, clock='total'):
+def time_at(rows, error, clock='cpu'):
     """Time to reach ``error``, between two points of the front on logarithmic scales; infinite beyond its end."""
     times, errors = front(rows, clock)
     if not len(errors) or errors[-1] > error:
