@@ -7,7 +7,7 @@ written by ``fesd.finite_elements``; ``held_controls`` reads from it) and ``homo
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
 ``evaluation``, ``gradient``, ``gradients``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``units_of_measure``,
-``expression_key``, ``node_search``, ``own_data`` and ``phase`` are tools. This room imports from no other.
+``expression_key``, ``structural_key``, ``node_search``, ``own_data`` and ``phase`` are tools. This room imports from no other.
 """
 
 from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
@@ -68,6 +68,7 @@ from pyomo_fesd.core.renamed import Renamed
 from pyomo_fesd.core.rollback import restored_on_error
 from pyomo_fesd.core.smallest import add_smallest, declare_smallest
 from pyomo_fesd.core.step import add_step, declare_step
+from pyomo_fesd.core.structural_key import StructuralKey, any_number, exactly, nine_digits, variables_of
 from pyomo_fesd.core.switched_systems import (
     Contact,
     Dependents,

@@ -8,10 +8,9 @@ from collections import defaultdict
 from collections.abc import Iterable
 
 import numpy as np
-from pyomo.core import value
 
-from pyomo_fesd.core.expression_key import prefix_tokens
 from pyomo_fesd.core.gradient import gradient, slopes_by_casadi
+from pyomo_fesd.core.structural_key import StructuralKey, exactly
 
 #: Expressions of equal form from which a function of their own pays.
 ALIKE = 8
@@ -46,18 +45,6 @@ def _together(expressions, variables):
 
 def _form(expression):
     """A key that is equal for expressions that differ in their variables only, and the variables."""
-    variables, positions = [], {}
-
-    def leaf(node):
-        if node.is_named_expression_type():
-            return None, (node.expr,)
-        if node.is_expression_type():
-            return (node.__class__, getattr(node, '_name', None), node.nargs()), node.args
-        if not node.is_variable_type():
-            return value(node, exception=False), ()
-        if id(node) not in positions:
-            positions[id(node)] = len(variables)
-            variables.append(node)
-        return ('v', positions[id(node)]), ()
-
-    return prefix_tokens([expression], leaf), variables
+    key = StructuralKey()
+    key.append(expression, exactly)
+    return tuple(key.tokens), key.variables

@@ -4,7 +4,7 @@ Files in the order of the data's way: ``simulate`` (entry), ``static_equations``
 ``passes`` through all elements with the ``step_sizes`` of a plan and the ``progress`` so far, ``element_solver`` (one element
 after the other, with the ``events`` between them).
 
-One element: ``equation_reader`` reads its ``element_equations``, ``structural_key`` tells which elements share compiled functions,
+One element: ``equation_reader`` reads its ``element_equations`` and tells which elements share compiled functions,
 ``determinacy`` refuses undetermined unknowns, ``element_class`` solves it: by Newton's method while the active set is known
 (``element_model``, ``element_residuals``, ``element_signs``, ``newton``, ``active_set_step``), by ``element_mpcc`` where it is not.
 ``largest_residuals`` explains failures.  ``first_guess`` is what ``mpec_hybrid`` calls where nothing is free.

@@ -6,9 +6,8 @@ import pyomo.environ as pyo
 from pyomo.core.expr.visitor import replace_expressions
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import FesdError, Pair
+from pyomo_fesd.core import FesdError, Pair, variables_of
 from pyomo_fesd.simulation.element_equations import ElementEquations
-from pyomo_fesd.simulation.structural_key import variables_of
 
 
 class ElementModel:

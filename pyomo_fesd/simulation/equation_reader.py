@@ -15,10 +15,20 @@ from pyomo.core.base.var import VarData
 from pyomo.core.expr import RangedExpression
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import MovingGrid, TimeIndex, derivatives, is_discretisation_equation, is_generated, read_complementarity
+from pyomo_fesd.core import (
+    MovingGrid,
+    StructuralKey,
+    TimeIndex,
+    any_number,
+    derivatives,
+    is_discretisation_equation,
+    is_generated,
+    nine_digits,
+    read_complementarity,
+    variables_of,
+)
 from pyomo_fesd.simulation.element_equations import ElementEquations, PointPairs
 from pyomo_fesd.simulation.requirements import Requirements
-from pyomo_fesd.simulation.structural_key import StructuralKey, variables_of
 
 #: A side below this part of the other is zero.
 STRICT = 1e-5
@@ -138,7 +148,7 @@ class EquationReader:
         key = StructuralKey()
         for c in constraints:
             # labels are rounded, and so are the coefficients of collocation
-            key.append(c.expr, numbers=not is_discretisation_equation(c))
+            key.append(c.expr, any_number if is_discretisation_equation(c) else nine_digits)
         for expr in chain(*event_functions.values(), *pairs, *(pair for p in points.values() for pair in p.pairs)):
             key.append(expr)
         unknown = self._unknown(key.variables, chosen, labels)

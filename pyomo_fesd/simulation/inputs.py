@@ -12,8 +12,7 @@ from pyomo.core import Block, Constraint, Var
 from pyomo.core.base.var import VarData
 from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import FesdError, TimeIndex, derivatives, is_indexed_by
-from pyomo_fesd.simulation.structural_key import variables_of
+from pyomo_fesd.core import FesdError, TimeIndex, derivatives, is_indexed_by, variables_of
 
 
 def read_inputs(inputs: Var | Iterable[Var], wrt: ContinuousSet) -> list[Var]:

@@ -20,8 +20,7 @@ from pyomo.core.expr.compare import compare_expressions
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import structural_rank
 
-from pyomo_fesd.core import TimeIndex
-from pyomo_fesd.simulation.structural_key import variables_of
+from pyomo_fesd.core import TimeIndex, variables_of
 
 
 class Requirements:

@@ -18,8 +18,7 @@ from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity
 from pyomo.util.calc_var_value import calculate_variable_from_constraint
 
-from pyomo_fesd.core import TimeIndex, is_generated, moving_grids, read_complementarity
-from pyomo_fesd.simulation.structural_key import variables_of
+from pyomo_fesd.core import TimeIndex, is_generated, moving_grids, read_complementarity, variables_of
 
 logger = logging.getLogger('pyomo_fesd')
 

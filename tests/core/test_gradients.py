@@ -21,6 +21,7 @@ FORMS = {
     'condition': lambda m, i: pyo.Expr_if(m.x[i] >= 0.1, m.x[i] * m.y, 0),
     'same variable': lambda m, i: m.x[i] * m.x[i],
     'two variables': lambda m, i: m.x[i] * m.y,
+    'variable or number': lambda m, i: m.x[i] + (m.y if i % 2 else 1),
     'root': lambda m, i: pyo.sqrt(m.x[i]),
 }
 COUNT = ALIKE + 2

@@ -12,7 +12,7 @@ from pyomo.common.numeric_types import native_numeric_types
 from pyomo.core import value
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import prefix_tokens
+from pyomo_fesd.core.expression_key import prefix_tokens
 
 
 def variables_of(expressions: Iterable) -> ComponentSet:
@@ -22,6 +22,21 @@ def variables_of(expressions: Iterable) -> ComponentSet:
         if hasattr(e, 'is_expression_type'):
             found.update(identify_variables(e, include_fixed=True))
     return found
+
+
+def nine_digits(number):
+    """A number as text, rounded as labels of time are; strings and None stay."""
+    return '%.9g' % number if number.__class__ in native_numeric_types else number
+
+
+def any_number(_):
+    """The same token for all numbers."""
+    return ''
+
+
+def exactly(number):
+    """The number itself, in a tuple: positions of variables are numbers too."""
+    return (number,)
 
 
 class StructuralKey:
@@ -38,9 +53,8 @@ class StructuralKey:
     def __init__(self):
         self.tokens, self.variables, self._positions = [], [], {}
 
-    def append(self, expr, numbers: bool = True) -> None:
-        """Append the tokens of ``expr``; without ``numbers`` all numbers count as equal."""
-        number = _nine_digits if numbers else _any_number
+    def append(self, expr, number=nine_digits) -> None:
+        """Append the tokens of ``expr``; ``number`` is a function from a number to its token."""
 
         def leaf(node):
             if node.is_variable_type():
@@ -58,12 +72,3 @@ class StructuralKey:
             self._positions[id(v)] = len(self.variables)
             self.variables.append(v)
         return self._positions[id(v)]
-
-
-def _nine_digits(number):
-    """A number as text, rounded as labels of time are; strings and None stay."""
-    return '%.9g' % number if number.__class__ in native_numeric_types else number
-
-
-def _any_number(_):
-    return ''
