@@ -22,6 +22,7 @@ from scipy.sparse.linalg import lsqr
 
 from pyomo_fesd.mpcc.compile.casadi_matrices import csr
 from pyomo_fesd.mpcc.compile.scaling import MILD
+from pyomo_fesd.mpcc.compile.sparse_entries import largest_entries, major_index
 
 #: Variables of a size within these bounds keep their unit.
 ORDINARY = (1e-4, 1e4)
@@ -185,17 +186,32 @@ def _evidence(c):
     values = np.concatenate([at.g, at.G, at.H])
     bounds = [np.concatenate([b, np.zeros(q)]) for b in (c.lbg, c.ubg)]
     cancelling = c.parameter_terms(points[0])
-    parts = [_linear(here, there, values, bounds, points[0], cancelling), _quadratic(c, len(values))]
+    # a side need not be zero: its constant shows no small size either
+    hidden = _hides_sizes(here, c.lbx, c.ubx) | (np.arange(len(values)) >= len(c.lbg))
+    parts = [_linear(here, there, values, bounds, points[0], cancelling, hidden), _quadratic(c, len(values))]
     return _Evidence.of(*(np.concatenate(arrays) for arrays in zip(*parts)))
 
 
-def _linear(here, there, values, bounds, w, cancelling):
+def _hides_sizes(J, lbx, ubx):
+    """Mask over the rows of J (csr) whose value may be far smaller than the variables.
+
+    Their terms may cancel, or the only one may be an initial value near 0.
+    """
+    with np.errstate(invalid='ignore'):
+        ends = np.sort(np.nan_to_num([J.data * bound[J.indices] for bound in (lbx, ubx)]), axis=0)
+    row, count = major_index(J), np.diff(J.indptr)
+    positive, negative = (np.bincount(row, sign, J.shape[0]) == count for sign in (ends[0] >= 0.0, ends[1] <= 0.0))
+    return (count == 1) | ~(positive | negative)
+
+
+def _linear(here, there, values, bounds, w, cancelling, hidden):
     """(row, variable, none, number) of the coefficients that are equal in two Jacobians (csr of one pattern), and of what is left
     in linear rows.
 
-    ``cancelling`` are the sizes of terms without variables.
+    ``cancelling`` are the sizes of terms without variables; the right-hand side of a ``hidden`` one is no evidence where it is
+    smaller than the coefficients.
     """
-    n, m, here = len(w), np.arange(len(values)), here.tocoo()
+    n, m, largest, here = len(w), np.arange(len(values)), largest_entries(here), here.tocoo()
     changed = here.data != there.data
     varies = np.bincount(here.row[changed], minlength=len(m)) > 0
     products = here.data * w[here.col]
@@ -205,7 +221,9 @@ def _linear(here, there, values, bounds, w, cancelling):
     left = np.where(varies, 0.0, left)
     sides = [np.where(np.isfinite(b), b, 0.0) - np.where(np.isfinite(b), left, 0.0) for b in bounds]
     # an equation's right-hand side counts once
-    sides[1] = np.where(sides[0] == sides[1], 0.0, sides[1])
+    equation = sides[0] == sides[1]
+    sides[1] = np.where(equation, 0.0, sides[1])
+    sides[0] = np.where(equation & hidden & (np.abs(sides[0]) < largest), 0.0, sides[0])
     row, first = np.concatenate([here.row[~changed], m, m]), np.concatenate([here.col[~changed], np.full(2 * len(m), n)])
     numbers = np.concatenate([here.data[~changed], *sides])
     return row, first, np.full(len(row), n), np.nan_to_num(numbers, posinf=0.0, neginf=0.0)

@@ -12,7 +12,7 @@ from pyomo_fesd.mpcc.compile.casadi_matrices import between, entries, times
 from pyomo_fesd.mpcc.compile.row_functions import RowFunctions
 
 #: Operations and coefficients beyond which functions are MX: SX ones are faster, but take longer to make.
-LARGE = 20000
+LARGE = 2000
 #: Up to so many, casadi differentiates the expressions as a whole in less time than derivatives of classes take to assemble.
 SHORT = 2000
 
