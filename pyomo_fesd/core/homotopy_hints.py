@@ -79,11 +79,14 @@ class Change:
     later, earlier : tuple of (ComplementarityData, ComplementarityData or None)
         the change comes one place later, or earlier, if each first pair takes the zero side that the second one has in the
         solution; with None its first side becomes zero
+    happening : tuple of ComplementarityData
+        the change is there, too, if the first side of one of them is not zero
     """
 
     differing: tuple[tuple[ComplementarityData, ComplementarityData], ...]
     later: tuple[tuple[ComplementarityData, ComplementarityData | None], ...]
     earlier: tuple[tuple[ComplementarityData, ComplementarityData | None], ...]
+    happening: tuple[ComplementarityData, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

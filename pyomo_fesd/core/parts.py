@@ -25,9 +25,12 @@ class Part:
         those among them that only say how it begins
     ends : tuple of (VarData, VarData)
         the same quantity at its beginning, a variable of the part before, and at its end
+    copies : bool
+        whether a copy of it can be inserted; not where other conditions between two parts depend on more than that
     """
 
     extent: VarData
     own: tuple[VarData, ...]
     gate: tuple[VarData, ...]
     ends: tuple[tuple[VarData, VarData], ...]
+    copies: bool = True

@@ -4,8 +4,8 @@ Where switches coincide, an element of length zero between them belongs to the s
 of the equations of an element is inserted there; the element that it copies keeps its own variables.
 
 Takes: the moving grid with all that was put on it.
-Leaves: a chain of ``Part`` in the block's ``HomotopyHints``.
-Does not apply: to modes with hysteresis and laws of state jumps, whose conditions at a boundary depend on both its sides.
+Leaves: a chain of ``Part`` in the block's ``HomotopyHints``; where there are modes with hysteresis or laws of state jumps, whose
+conditions at a boundary depend on both its sides, nothing can be inserted.
 """
 
 from collections import defaultdict
@@ -24,8 +24,7 @@ LATER = {ELEMENT: 0} | dict.fromkeys(BOUNDARIES, 1)
 
 def add_chain(moving: MovingGrid, families: list[dict]) -> None:
     """Add the chain of the elements; ``families`` are all variables over time, each as {label: data}."""
-    if moving.hysteresis is not None or (moving.state_jumps is not None and moving.state_jumps.laws):
-        return
+    depends_on_both = moving.hysteresis is not None or (moving.state_jumps is not None and bool(moving.state_jumps.laws))
     generated, gates = _generated(moving)
     if generated is None:
         return
@@ -37,6 +36,7 @@ def add_chain(moving: MovingGrid, families: list[dict]) -> None:
                 own=(*(f[t] for f in families for t in e.own_labels if t in f), *generated[e.n], moving.r[e.n]),
                 gate=tuple(gates[e.n]),
                 ends=tuple((f[e.left], f[e.right]) for f in families if e.left in f and e.right in f),
+                copies=not depends_on_both,
             )
             for e in moving.grid.elements
         )

@@ -48,10 +48,12 @@ def _jumping_between_stages(moving):
 def _changes(places, before, families, left_out) -> Iterator[Change]:
     """The change of each family at the boundary after ``before``."""
     compared = _by_family(places.compared(before), families)
+    happening = _by_family([(pair, None) for pair in places.happening(before)], families)
     later, earlier = (_by_family(places.moved(before, step), families) for step in (1, -1))
-    for family, differing in compared.items():
+    for family in dict.fromkeys([*compared, *happening]):
         if family not in left_out:
-            yield Change(tuple(differing), tuple(later[family]), tuple(earlier[family]))
+            jumps = tuple(pair for pair, _ in happening[family])
+            yield Change(tuple(compared[family]), tuple(later[family]), tuple(earlier[family]), jumps)
 
 
 def _by_family(pairs, families):

@@ -80,10 +80,12 @@ class PairsByPlace:
         return list(inside), list(_matching(self._of_boundaries, boundary, boundary + step))
 
     def compared(self, before: Element) -> list[tuple]:
-        """Return the pairs whose zero sides show whether something switches at the boundary after ``before``, with partners."""
-        n = before.n
-        jumps = [pair for pair in _matching(self._of_jumps, n, n - 1) if pair[1] is not None]
-        return [*_matching(self._of_elements, n + 1, n), *(jumps or _matching(self._of_jumps, n, n + 1))]
+        """Return the pairs that differ if modes switch at the boundary after ``before``, with their partners."""
+        return list(_matching(self._of_elements, before.n + 1, before.n))
+
+    def happening(self, before: Element) -> list:
+        """Return the pairs whose first side is not zero if states jump at the boundary after ``before``."""
+        return [pair for pairs in self._of_jumps for pair in pairs[before.n].values()]
 
 
 def _pairs_of_jumps(jumps):

@@ -41,10 +41,11 @@ def test_own_variables_correspond_from_part_to_part():
     assert all(some == names[1] for some in names[1:])
 
 
-def test_modes_with_hysteresis_have_no_chain():
+def test_nothing_is_inserted_between_modes_with_hysteresis():
     m = two_experiments.build()
     move(dcs(m, hysteresis=[m.law]), 4, 2)
-    assert not all_hints(m).chains
+    assert not any(part.copies for part in chain(m))
+    assert all(part.copies for part in chain(transform(two_experiments.build(), 4)))
 
 
 # What inserted parts show
@@ -143,3 +144,15 @@ def test_a_certified_push_costs_least_in_an_exact_replay():
     lowest = min(two_carts.replay(u + step) for step in steps)
     descends = lowest < two_carts.replay(u) - 2e-5
     assert not (results.solver.stationarity == 'B' and descends)
+
+
+@pytest.mark.parametrize('seed', MINIMA + OTHERS)
+def test_with_hysteresis_it_takes_an_element_to_spare(seed):
+    relays = coupled_relays.Relays.draw(seed)
+    for nfe, spare in ((2, False), (4, True)):
+        m = coupled_relays.build(relays)
+        move(dcs(m, hysteresis=[m.law]), nfe, 2)
+        m.theta.fix(1)
+        pyomo_fesd.simulate(m)
+        m.theta.unfix()
+        assert pyomo_fesd.certify(m).certified == (spare and relays.is_minimum)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.search import FEW, Verdict, exhaust, leaves
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Stop
-from pyomo_fesd.mpcc.subproblems import G_ZERO, Stationarity
+from pyomo_fesd.mpcc.subproblems import G_ZERO, MATTERS, Stationarity
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
@@ -223,8 +223,16 @@ class Branches:
             return self._step_down(point, enough) if worth else None
         if point.certificate.grade is not Stationarity.B:
             return None
-        better = self._beyond(point, enough, NEARLY, CLEAR)
+        better = self._beyond(point, enough, NEARLY, CLEAR) or self._within_round_off(point)
         return self._beyond(point, enough, np.inf, 0.0, WIDE) if better is None and worth and self._global_lpec else better
+
+    def _within_round_off(self, point):
+        """A clearly better point in the branch of a direction whose descent matters, though it proves nothing."""
+        step, enough = point.certificate.lpec, point.f - MATTERS * abs(point.f)
+        if step is None or not step.matters:
+            return None
+        found = (self.certified(w, step.zero, max_iter=SECOND) for w in (point.w + step.d, point.w))
+        return next((better for better in found if is_below(better, enough)), None)
 
     def _step_down(self, point, enough):
         """In the branch of the certificate's direction: from its end, or within ever smaller trust regions."""

@@ -1,10 +1,10 @@
 """Coinciding changes: every order of them is tried before a point counts as certified.
 
 In the incumbent the branches of all orders meet, but none of them is beside it for the LPEC: the place between two changes has no
-extent there.  For each order the incumbent is solved once more with such a place, of extent zero.  If the linearised problem of
-that branch descends, the place grows and leads to a better point; if it does not, or if there is no such branch, the order is
-settled.  A point with an order that is neither is not certified.  Changes at an end of a row of places coincide with the end
-(``arrivals``).
+extent there.  One is inserted (``insertions``).  Where that does not settle an order, the incumbent is solved once more with a
+spare place, of extent zero.  If the linearised problem of that branch descends, the place grows and leads to a better point; if it
+does not, the order is settled.  A point with any other order is not certified.  Changes at an end of a row of places coincide with
+the end (``arrivals``).
 """
 
 from collections.abc import Iterator
@@ -25,8 +25,8 @@ from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets, Stationarity, Verdic
 PATIENCE = 300
 #: A place nearer to its least extent than this may be none: NLP solvers leave it a little above its bound.
 NEAR_BOUND = 1e-4
-#: Outcomes of an order that leads to no better point, and of a branch that does not contain the incumbent.
-SETTLED, OPEN, ABSENT = 'settled', 'open', 'absent'
+#: Outcomes of an order: it leads to no better point; or that could not be shown.
+SETTLED, OPEN = 'settled', 'open'
 
 
 @dataclass(frozen=True)
@@ -107,11 +107,8 @@ class Coincidences:
         verdicts = [judge() for judge in order.judges]
         if Verdict.IMPOSSIBLE in verdicts or Verdict.NO_DESCENT in verdicts:
             return SETTLED
-        found = self._first(partial(self._try, point), order.ways)
-        if found is ABSENT:
-            # the branch with a place to spare does not contain the point, but an inserted place may grow
-            return OPEN if Verdict.DESCENT in verdicts else SETTLED
-        return found
+        # that a branch with a place to spare does not contain the point proves nothing: there may be no place to spare
+        return self._first(partial(self._try, point), order.ways)
 
     def _is_flat(self, point):
         """Whether no direction descends, whatever the constraints."""
@@ -155,17 +152,18 @@ class Coincidences:
         enough = self._tolerances.descent
         with self._c.vanishing(way.extents):
             start, equal = self._beside(point, way)
-            if start in (ABSENT, OPEN):
-                return start
-            if self._is_above(point, start):
-                return ABSENT
+            if start is OPEN or self._is_above(point, start):
+                return OPEN
             gamma = np.zeros(len(way.zero), dtype=bool)
             gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
             sets = ActiveSets(self._subsolves.settled(start.w, way.zero), gamma)
-            step = self._subsolves.lpec(start.w, sets, self._tolerances.radius, equal, multipliers=-start.lam_g, enough=enough)
+            w = self._subsolves.at_limit(start.w, sets.zero, way.extents, point.w[way.extents].max())
+            if w is None:
+                return OPEN
+            step = self._subsolves.lpec(w, sets, self._tolerances.radius, equal, multipliers=-start.lam_g, enough=enough)
         if not step.solved:
             return OPEN
-        return SETTLED if step.descent <= enough else self._grown(point, start.w, step.d, step.zero)
+        return SETTLED if step.descent <= enough else self._grown(point, w, step.d, step.zero)
 
     def _beside(self, point, way):
         """The incumbent in the branch of a way, its places without extent, and the decisions in force; or the outcome."""
@@ -175,9 +173,9 @@ class Coincidences:
         more['box'][0][way.extents] = 0.0
         first = self._subsolves.attempt(start, zero, None, 1.0, **more)
         if first is None or first.status in INFEASIBLE:
-            return ABSENT, None
+            return OPEN, None
         if first.solved and self._is_above(point, first):
-            return ABSENT, None
+            return OPEN, None
         apart = self._decides(point.w, way.extents)
         solved, equal = self._branches.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
         if first.solved and (solved is None or not solved.solved):
@@ -207,7 +205,8 @@ def _differs(change, sets):
     """Whether a change is there; a bi-active or open pair lies on both sides of it already."""
     undecided = sets.gamma | sets.open
     clear = ~undecided[change.pairs] & ~undecided[change.partners]
-    return bool(np.any((sets.zero[change.pairs] != sets.zero[change.partners]) & clear))
+    happening = (sets.zero[change.happening] != G_ZERO) & ~undecided[change.happening]
+    return bool(happening.any() or np.any((sets.zero[change.pairs] != sets.zero[change.partners]) & clear))
 
 
 def _subsets(changes, fixed):

@@ -37,11 +37,21 @@ class OrdersByInsertion:
         return self._verdict(coincidence, coincidence.before, some, present, self._earlier)
 
     def entered(self, way) -> Verdict:
-        """The verdict of a change that has come in on both sides of an end between two rows, by the first of its places."""
-        k = self._parts.by_extent.get(way.extents[0])
-        if k is None or not way.between:
+        """The verdict of a change that has come in at an end, by the place beyond it, or those on both sides of an end between two
+        rows: each of them must be possible."""
+        if len(way.extents) != 1 + way.between:
             return Verdict.UNKNOWN
-        return self._subsolves.insertion(self._point, self._sets, Insertion(k, False, way.zero, self._sets.zero, (k, k + 1)), None)
+        found = (self._at_end(way, extent, beyond) for beyond, extent in enumerate(way.extents))
+        return Verdict.IMPOSSIBLE if Verdict.IMPOSSIBLE in found else Verdict.UNKNOWN
+
+    def _at_end(self, way, extent, beyond):
+        """The verdict of the place at an end, by its values alone; ``beyond`` is 1 for the one after an end between two rows."""
+        k = self._parts.by_extent.get(extent)
+        if k is None:
+            return Verdict.UNKNOWN
+        ahead = bool(beyond) or (not way.between and self._parts.previous(k) is None)
+        order = Insertion(k, ahead, way.zero, self._sets.zero, (k, *self._parts.beside(k)))
+        return self._subsolves.insertion(self._point, self._sets, order, None)
 
     def _verdict(self, coincidence, extent, some, present, insertion):
         k = self._parts.by_extent.get(extent)

@@ -102,6 +102,10 @@ class Subsolves:
         self._log('order', 0.0, point.w, 0, verdict.value, started)
         return verdict
 
+    def at_limit(self, w, zero, extents, size):
+        """``w`` with the values that parts of extent 0 have as they grow; None without any."""
+        return self._insertions.at_limit(w, zero, extents, size)
+
     def suggestion(self, w, sets, Delta):
         """Solve an LPEC that may stop early."""
         spent = sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch'))

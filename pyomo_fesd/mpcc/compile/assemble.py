@@ -248,7 +248,12 @@ def _neighbour(branch, pairs, columns, s_x):
 
 def _coincidence(hint, pairs, columns):
     changes = tuple(
-        ChangeIndices(*both_positions(change.differing, pairs), moves(change.later, pairs), moves(change.earlier, pairs))
+        ChangeIndices(
+            *both_positions(change.differing, pairs),
+            moves(change.later, pairs),
+            moves(change.earlier, pairs),
+            positions_of(change.happening, pairs),
+        )
         for change in hint.changes
     )
     extents = hint.later, hint.earlier, hint.before, hint.after

@@ -44,12 +44,14 @@ class ChangeIndices:
     ----------
     pairs, partners : int arrays
     later, earlier : MoveIndices
+    happening : int array
     """
 
     pairs: np.ndarray
     partners: np.ndarray
     later: MoveIndices
     earlier: MoveIndices
+    happening: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,7 @@ class PartIndices:
         its chain, and its place in it
     whole : bool
         whether all variables of the part are free, but for those that are given in all parts
+    copies : bool
     """
 
     extent: int
@@ -91,6 +94,7 @@ class PartIndices:
     chain: int
     number: int
     whole: bool
+    copies: bool
 
 
 @dataclass(frozen=True, eq=False)

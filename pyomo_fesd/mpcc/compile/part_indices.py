@@ -25,4 +25,5 @@ def _part(part, columns, chain, number):
         chain,
         number,
         not one_is_given,
+        part.copies,
     )

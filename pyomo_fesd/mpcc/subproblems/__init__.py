@@ -10,7 +10,7 @@ certificate), ``insertion`` (whether a part inserted into a point may grow) with
 from pyomo_fesd.mpcc.subproblems.active_set import FREE, G_ZERO, H_ZERO, ActiveSets, active_sets
 from pyomo_fesd.mpcc.subproblems.branch import Branch
 from pyomo_fesd.mpcc.subproblems.insertion import Insertion, Insertions, Verdict
-from pyomo_fesd.mpcc.subproblems.lpec import Lpec
+from pyomo_fesd.mpcc.subproblems.lpec import MATTERS, Lpec
 from pyomo_fesd.mpcc.subproblems.parts import Parts
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS
 from pyomo_fesd.mpcc.subproblems.restoration import Restoration

@@ -45,12 +45,9 @@ class Descent:
     def proved(self, y) -> float:
         """The largest relative descent that multipliers ``y`` (rows, positive at ``low``) leave possible."""
         p = self._p
-        y = np.where(np.isneginf(p.low), np.minimum(y, 0.0), y)
-        y = np.where(np.isposinf(p.high), np.maximum(y, 0.0), y)
         (m, n), A, row = p.A.shape, p.A, major_index(p.A)
+        y, columns, rows = self._bounds(y)
         entries, products = np.abs(A.data), np.abs(A.data) * np.abs(y)[row]
-        columns = -_least(p.cost - np.bincount(A.indices, A.data * y[row], n), p.lower, p.upper)
-        rows = -_least(y, p.low, p.high)
         size = (np.abs(p.cost) + np.bincount(A.indices, products, n) + self._curvature(y)) * p.reach
         floor = FLOOR * self._reach_of_objective()
         by_columns = _ratios(columns, size, floor)
@@ -61,9 +58,22 @@ class Descent:
         by_rows = _ratios(rows, extent, floor) * np.minimum(of_rows, 1.0)
         return float(max(by_columns.max(initial=0.0), by_rows.max(initial=0.0)))
 
-    def negligible(self, value) -> bool:
-        """Whether a value of the program is round-off."""
-        return -value <= FLOOR * self._reach_of_objective()
+    def least(self, y) -> float:
+        """The lower bound of the program's value that multipliers ``y`` prove."""
+        _, columns, rows = self._bounds(y)
+        return -float(columns.sum() + rows.sum())
+
+    def negligible(self, value, floor=FLOOR) -> bool:
+        """Whether a value of the program is round-off: below the part ``floor`` of the objective's largest term."""
+        return -value <= floor * self._reach_of_objective()
+
+    def _bounds(self, y):
+        """Multipliers of the right sign, and by how much each column and each row may descend."""
+        p = self._p
+        y = np.where(np.isneginf(p.low), np.minimum(y, 0.0), y)
+        y = np.where(np.isposinf(p.high), np.maximum(y, 0.0), y)
+        reduced = p.cost - np.bincount(p.A.indices, p.A.data * y[major_index(p.A)], len(p.cost))
+        return y, -_least(reduced, p.lower, p.upper), -_least(y, p.low, p.high)
 
     def _curvature(self, y):
         along = [np.abs(cost - of_rows(y)) for cost, of_rows in self._known_changes()]

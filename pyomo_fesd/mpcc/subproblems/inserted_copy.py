@@ -45,22 +45,29 @@ class Copy:
         self._equations = InsertedPart(c, sides, parts, self._inner, self.rows, insertion.zero)
         self._at, self.limit = [], None
 
-    def solve(self, w, guesses) -> bool:
-        """Find the values beside the point ``w``, from those of one of the parts ``guesses``."""
-        for guess in guesses:
-            self._at = []
-            for extent in EXTENTS:
-                start = self._start(w, guess) if not self._at else self._at[-1].copy()
-                start[self.part.extent] = extent * w[self.part.extent]
-                self._at.append(self._equations.solve(start))
-                if self._at[-1] is None:
-                    break
-            if self._at[-1] is not None and self._has_limit():
-                long, short = self._at
-                self.limit = _limit(long, short)
-                self.limit[self.part.extent] = 0.0
-                return True
-        return False
+    def solve(self, w, guesses, size=None) -> bool:
+        """Find the values beside the point ``w``, from those of one of the parts ``guesses``, at extents relative to ``size``.
+
+        ``size`` is the extent of the part, unless it is given.
+        """
+        size = w[self.part.extent] if size is None else size
+        return any(self.follow(self._start(w, guess), size) for guess in guesses)
+
+    def follow(self, start, size) -> bool:
+        """Find the values as the extent goes to zero, from those of ``start``, at extents relative to ``size``."""
+        self._at = []
+        for extent in EXTENTS:
+            start = start.copy()
+            start[self.part.extent] = extent * size
+            start = self._equations.solve(start)
+            if start is None:
+                return False
+            self._at.append(start)
+        if not self._has_limit():
+            return False
+        self.limit = _limit(*self._at)
+        self.limit[self.part.extent] = 0.0
+        return True
 
     def _start(self, w, guess):
         """Values of part ``guess``, its last ones those with which the copy begins."""

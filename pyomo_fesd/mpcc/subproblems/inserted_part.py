@@ -13,7 +13,8 @@ Leaves: the point with the values of the copy in place of those of the part; Non
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import nnls
+from scipy.optimize import linprog, nnls
+from scipy.sparse.linalg import LinearOperator, norm, onenormest, splu
 
 from pyomo_fesd.mpcc.compile import with_entries
 
@@ -25,6 +26,8 @@ CONTRADICTION, SEED = 1e-3, 0
 EXACT = 1e-9
 #: Singular values below this, relative to the largest one, are zero: extents enter with their square.
 SINGULAR = 1e-13
+#: Part of the condition number that belongs to this, up to which an estimate shows that no singular value is zero.
+CLEARLY = 1e-2
 
 
 class InsertedPart:
@@ -62,7 +65,7 @@ class InsertedPart:
             J = self._c.stacked_jacobian(w)[rows]
             residual = (self._values(w) - self._low)[rows]
             scale = _largest(J)
-            A = (sparse.diags(1 / scale) @ J)[:, free].toarray()
+            A = (sparse.diags(1 / scale) @ J)[:, free]
             step, determined = self._step(A, residual / scale, w, free)
             w[free] += step
             if np.abs(step).max(initial=0.0) <= LAST_STEP * max(1.0, np.abs(w[free]).max(initial=0.0)):
@@ -71,7 +74,7 @@ class InsertedPart:
         return None
 
     def contradict(self, w) -> bool:
-        """Whether equations that are linear in the variables to determine contradict each other, whatever their values."""
+        """Whether no values within their bounds satisfy the equations that are linear in the variables to determine."""
         rows, fixed, at = self._equations(w)
         w = w.copy()
         w[fixed] = at
@@ -81,17 +84,18 @@ class InsertedPart:
         linear = np.abs(A - B).max(axis=1, initial=0.0) <= EXACT
         terms = np.maximum(1.0, abs(self._c.stacked_jacobian(w)[rows]) @ np.abs(w))
         A, residual = A[linear] / terms[linear, None], ((self._values(w) - self._low)[rows] / terms)[linear]
-        left = residual - A @ np.linalg.lstsq(A, residual, rcond=SINGULAR)[0] if len(A) else residual
-        return bool(np.abs(left).max(initial=0.0) > CONTRADICTION)
+        return _least_violation(A, residual, self._c.lbx[free] - w[free], self._c.ubx[free] - w[free]) > CONTRADICTION
 
     def slopes(self, w, row):
         """Derivatives of a row where the equations hold, by all variables that they do not determine."""
         J = self._c.stacked_jacobian(w)
         rows, fixed, _ = self._equations(w)
         free, found = np.setdiff1d(self._columns, fixed), J[row].toarray().ravel()
-        scale = sparse.diags(1 / _largest(J[rows]))
-        weights = np.linalg.lstsq((scale @ J[rows])[:, free].toarray().T, found[free], rcond=None)[0]
-        found = found - (scale @ J[rows]).T @ weights
+        A = sparse.diags(1 / _largest(J[rows])) @ J[rows]
+        weights = _solution(A[:, free].T, found[free])
+        if weights is None:
+            weights = np.linalg.lstsq(A[:, free].toarray().T, found[free], rcond=None)[0]
+        found = found - A.T @ weights
         found[self._columns] = 0.0
         return found
 
@@ -153,6 +157,10 @@ class InsertedPart:
 
     def _step(self, A, residual, w, free):
         """A Newton step of least length, the variables of gates within their bounds; and whether all others are determined."""
+        step = None if self._gates[free].any() else _solution(A, -residual)
+        return self._least_step(A.toarray(), residual, w, free) if step is None else (step, True)
+
+    def _least_step(self, A, residual, w, free):
         at_bound = np.zeros(len(free), dtype=bool)
         gates, low = self._gates[free], self._c.lbx[free]
         for _ in range(1 + np.count_nonzero(gates)):
@@ -168,6 +176,32 @@ class InsertedPart:
                 return step, not np.any(undetermined[~gates[inner]] > 1e-6)
             at_bound |= below
         return step, False
+
+
+def _solution(A, b):
+    """The solution of a square sparse system; None if its matrix may be singular, or is not square."""
+    if A.shape[0] != A.shape[1] or not A.shape[0]:
+        return None
+    try:
+        factors = splu(A.tocsc())
+    except RuntimeError:
+        return None
+    inverse = LinearOperator(A.shape, factors.solve, lambda y: factors.solve(y, 'T'), dtype=float)
+    step = factors.solve(b)
+    # an estimate from below: beyond a hundredth of the limit the singular values decide
+    is_clear = np.isfinite(step).all() and onenormest(inverse) * norm(A, 1) < CLEARLY / SINGULAR
+    return step if is_clear else None
+
+
+def _least_violation(A, residual, low, high):
+    """The least largest entry of ``|residual + A step|`` over steps between bounds; 0 if it is not found."""
+    if not len(A):
+        return 0.0
+    cost, of_all = np.append(np.zeros(A.shape[1]), 1.0), -np.ones((len(A), 1))
+    rows = np.vstack([np.hstack([A, of_all]), np.hstack([-A, of_all])])
+    bounds = np.column_stack([np.append(low, 0.0), np.append(high, np.inf)])
+    found = linprog(cost, rows, np.concatenate([-residual, residual]), bounds=bounds)
+    return found.fun if found.status == 0 else 0.0
 
 
 def _largest(J):

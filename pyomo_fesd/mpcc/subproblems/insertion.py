@@ -86,7 +86,7 @@ class Insertions:
             whether the copy may grow is not looked at
         """
         part = self._parts.all[insertion.k]
-        if not self._applies(w, insertion):
+        if not self._applies(w, insertion, grows=present is not None):
             return Verdict.UNKNOWN
         with self._c.vanishing(np.array([part.extent])):
             copy = Copy(self._c, self._sides, self._parts, insertion)
@@ -100,10 +100,36 @@ class Insertions:
             return Verdict.UNKNOWN
         return Verdict.DESCENT if found.descent > self._tolerances.descent else Verdict.NO_DESCENT
 
-    def _applies(self, w, insertion):
-        part, following = self._parts.all[insertion.k], self._following(insertion)
+    def at_limit(self, w, zero, extents, size):
+        """``w`` with the values that parts of extent 0 have as they grow, which their equations may not determine at 0.
+
+        None where they are not determined then either, or have no limit.
+
+        Parameters
+        ----------
+        zero : int array (q)
+            zero sides
+        extents : int array
+            variables that are 0 at ``w``; None, too, if one of them is that of no part
+        size : float
+            extents are small relative to this
+        """
+        for extent in extents:
+            k = self._parts.by_extent.get(extent)
+            if k is None:
+                return None
+            copy = Copy(self._c, self._sides, self._parts, Insertion(k, True, zero, zero, (k,)))
+            if not (copy.follow(w, size) or copy.solve(w, self._parts.beside(k), size)):
+                return None
+            w = copy.limit
+        return w
+
+    def _applies(self, w, insertion, grows):
+        part = self._parts.all[insertion.k]
+        # the copy of a part whose first values are given begins with them
+        possible = part.copies and (part.whole or (insertion.ahead and not grows))
         # where amounts lie in fillings depends on all extents before them
-        possible = part.whole and following is not None and not self._c.fillings
+        possible = possible and not (grows and self._following(insertion) is None) and not self._c.fillings
         return possible and not self._is_beside_a_short_part(w, insertion.k)
 
     @staticmethod

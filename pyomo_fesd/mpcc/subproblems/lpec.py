@@ -13,6 +13,9 @@ and a pair of the next one would stop a descent that goes on beyond it before it
 
 With multipliers, weak duality comes first: if it shows that even without the binaries no direction descends, no branch has one, and
 HiGHS is not called.
+
+A descent that is small beside the terms of the objective's gradient may still matter where the objective is a small sum of large
+terms.  It is no proof against the point, but worth a look (``LpecResult.matters``).
 """
 
 from dataclasses import dataclass, replace
@@ -30,6 +33,9 @@ from pyomo_fesd.mpcc.subproblems.side_constraints import release_followers, with
 
 #: A relative descent beyond positive sides of fillings counts from here: those of two places differ by the error of a method.
 BEYOND_FILLINGS = 1e-4
+#: A value above this, relative to the objective, matters although the descent relative to the objective's terms does not count.
+#: It is also above this part of the objective's largest term: what a solution with all digits would not leave.
+MATTERS, LEFT = 1e-3, 1e-10
 #: Displacements, relative to the variables' sizes, along which gradients are compared; so many, in random directions.
 DISPLACEMENT, DISPLACEMENTS, SEED = 1e-4, 2, 0
 
@@ -49,6 +55,8 @@ class LpecResult:
     binaries : int
     descent : float
         the value relative to the terms of the gradient (see ``descent``): free of units and of the objective's offset
+    matters : bool
+        whether the descent does not count, but the value is above round-off, and not small beside the objective
     """
 
     solved: bool
@@ -57,6 +65,7 @@ class LpecResult:
     zero: np.ndarray
     binaries: int
     descent: float = 0.0
+    matters: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,11 +126,17 @@ class Lpec:
         sets, equal, at = self.linearised(w, sets, Delta, equal, beyond, released)
         rows = np.concatenate(row_places(sets, equal, len(self._c.lbg)))
         descent = Descent(at.program, lambda: [(cost, partial(_product, A, rows)) for cost, A in self.changes(w)])
-        if multipliers is not None and enough is not None:
-            left = descent.proved(self._row_multipliers(multipliers, sets, equal))
-            if left <= enough:
+        if enough is None:
+            return self.best(sets, at, descent, False, limits)
+        if multipliers is not None:
+            y = self._row_multipliers(multipliers, sets, equal)
+            if descent.proved(y) <= enough and not self._matters(w, descent, descent.least(y)):
                 return LpecResult(True, 0.0, np.zeros(len(w)), sets.zero, 0)
-        return self.best(sets, at, descent, enough is not None, limits)
+        found = self.best(sets, at, descent, True, limits)
+        return replace(found, matters=found.descent <= enough and self._matters(w, descent, found.value))
+
+    def _matters(self, w, descent, value):
+        return -value > MATTERS * abs(self._c.evaluate(w).f) and not descent.negligible(value, LEFT)
 
     def linearised(self, w, sets, Delta, equal=None, beyond=False, released=False):
         """The LPEC without its binaries; also the active sets and the decisions with which it was written."""

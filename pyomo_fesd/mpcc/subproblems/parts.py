@@ -34,6 +34,14 @@ class Parts:
         part, other = self.all[k], self.all[k + 1]
         return k + 1 if (other.chain, other.number) == (part.chain, part.number + 1) else None
 
+    def previous(self, k):
+        """The number of the part before part ``k``; None without one."""
+        return k - 1 if k > 0 and self.next(k - 1) == k else None
+
+    def beside(self, k):
+        """The numbers of the parts before and after part ``k``, where there are any."""
+        return tuple(j for j in (self.previous(k), self.next(k)) if j is not None)
+
     @cached_property
     def of_variable(self):
         """The part of each variable (n)."""

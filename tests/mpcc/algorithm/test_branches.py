@@ -32,6 +32,17 @@ def two_minima(x0=0.0, y0=1.0):
     return m
 
 
+def small_sum_of_large_terms(factor=1e8):
+    """f = 1 + p - 0.3 q with 0 <= p perp q >= 0, as a difference of two terms of the size ``factor``."""
+    m = pyo.ConcreteModel()
+    m.p, m.q = pyo.Var(bounds=(0, 1), initialize=0.5), pyo.Var(bounds=(0, 1), initialize=0)
+    m.x, m.y = (pyo.Var(bounds=(-2, 2), initialize=0.5) for _ in range(2))
+    m.pair = Complementarity(expr=complements(m.p >= 0, m.q >= 0))
+    m.small = pyo.Constraint(expr=m.x - m.y == (1 + m.p - 0.3 * m.q) / factor)
+    m.f = pyo.Objective(expr=factor * (m.x - m.y))
+    return m
+
+
 def at_point(m, final, **options):
     """Parts after ``explore_from`` the model's values; with the reduced LPEC by default."""
     p = parts(m, **{'lpec': 'reduced'} | options)
@@ -49,6 +60,12 @@ def test_a_stationary_incumbent_is_left_along_the_lpecs_direction():
 def test_a_side_that_ipopt_leaves_above_the_tolerance_hides_no_descent(final):
     p = at_point(c_stationary(), final)  # ends at y = 6e-6
     assert p.run.point.w == pytest.approx(p.point(x=1.0, y=0.0), abs=1e-6)
+
+
+def test_a_descent_within_the_round_off_of_large_terms_is_followed_where_it_matters():
+    p = at_point(small_sum_of_large_terms(), True)
+    first, *_, last = p.kinds('certificate')
+    assert first.status == last.status == 'B' and (first.f, last.f) == pytest.approx((1, 0.7), rel=1e-6)
 
 
 def test_it_is_kept_uncertified_while_the_homotopy_promises_something_better():
