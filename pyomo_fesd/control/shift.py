@@ -100,7 +100,7 @@ class Shift:
         yield from _moved(jumps.copy, 0, self._by, lambda index: None)
         if jumps.impacts is not None:
             impacts = jumps.impacts
-            for component in (impacts.impulse, impacts.above, impacts.below, impacts.leaving):
+            for component in (impacts.impulse, impacts.second, impacts.above, impacts.below, impacts.leaving):
                 yield from _moved(component, 1, self._by, lambda index: 0.0)
             for component in (impacts.velocity, impacts.direction):
                 yield from _moved(component, 0, self._by, lambda index: None)

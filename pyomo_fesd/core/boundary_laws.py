@@ -4,7 +4,7 @@ from collections.abc import Container
 from dataclasses import dataclass
 
 from pyomo.common.collections import ComponentMap
-from pyomo.core import Block, Constraint, Expression, Var, value
+from pyomo.core import Block, Constraint, Expression, Var, quicksum, value
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core.complementarity import Pair
@@ -24,8 +24,8 @@ class Impacts:
         one for each ``contact`` over time, with ``name``, ``gaps`` and ``touching`` by label
     block : Block
         the generated block that holds the components below
-    impulse : Var over (contact, boundary)
-        Lambda
+    impulse, second : Var over (contact, boundary)
+        Lambda; of bodies that must not slip its parts along the first and the second edge of the friction cone
     above, below : Var over (contact, boundary)
         P and N: the parts of gamma(v+) + e gamma(v-)
     leaving : Var over (contact, boundary)
@@ -53,6 +53,7 @@ class Impacts:
     laws: list
     block: Block
     impulse: Var
+    second: Var
     above: Var
     below: Var
     leaving: Var
@@ -76,13 +77,26 @@ class Impacts:
         """The equations of mu."""
         return self.block.component('closed')
 
+    @property
+    def sticking(self) -> list[str]:
+        """The names of the contacts whose bodies must not slip, a condition on the controls."""
+        return [law.name for law in self.laws if law.sticking]
+
+    def impulses(self, name: str, b: int) -> list:
+        """Return the impulses of a contact at boundary ``b``: one, or those along the two edges of the friction cone."""
+        return [some[name, b] for some in (self.impulse, self.second) if (name, b) in some]
+
+    def normal_impulse(self, name: str, b: int):
+        """Return Lambda of a contact at boundary ``b``."""
+        return quicksum(self.impulses(name, b))
+
     def active(self, n: int) -> list[str]:
         """Return the names of the contacts with an impact at the right boundary of element ``n``."""
         return [law.name for law in self.laws if self._size(law, n) > NO_IMPULSE * max(1.0, self._largest(law))]
 
     def unknown(self, b: int, closed: Container[str]) -> list:
         """Return the variables of the laws at boundary ``b`` that the ``closed`` contacts determine, with N = 0."""
-        parts = [v for some in (self.impulse, self.above, self.leaving) for v in _at(some, b, closed)]
+        parts = [v for some in (self.impulse, self.second, self.above, self.leaving) for v in _at(some, b, closed)]
         return [*parts, *_at(self.velocity, b), *_at(self.direction, b)]
 
     def rows(self, b: int, closed: Container[str]) -> list:
@@ -114,7 +128,7 @@ class Impacts:
         return [*_at(self.balance, b), *_at(self.weights, b)]
 
     def _size(self, law, n):
-        return (self.impulse[law.name, n].value or 0.0) if (law.name, n) in self.impulse else 0.0
+        return sum(v.value or 0.0 for v in self.impulses(law.name, n))
 
     def _largest(self, law):
         return max((self._size(law, n) for name, n in self.impulse if name == law.name), default=0.0)

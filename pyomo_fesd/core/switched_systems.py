@@ -74,19 +74,25 @@ class Contact:
         the block that ``contact`` made
     gap : ExpressionData
         the distance, never negative
-    normal : VarData
-        the contact force, 0 <= normal perp gap >= 0
+    distance : ExpressionData or VarData
+        the gap in the condition of contact: itself, or a variable that equals it
+    forces : tuple of VarData
+        the contact force, or those along the two edges of the friction cone: 0 <= their sum perp distance >= 0
     touching : ComplementarityData
         this condition
     restitution : number or expression
         e, the part of the normal velocity that an impact returns
+    sticking : ComplementarityData or None
+        the condition that closed bodies do not slip
     """
 
     block: Any
     gap: Any
-    normal: Any
+    distance: Any
+    forces: tuple
     touching: Any
     restitution: Any
+    sticking: Any = None
 
 
 @dataclass(frozen=True)

@@ -25,15 +25,19 @@ class ContactLaw:
     Attributes
     ----------
     name : str
-    gaps, normals, touching : dict label -> expression, VarData, ComplementarityData
+    gaps, distances, forces, touching : dict label -> expression, expression, tuple of VarData, ComplementarityData
     restitution : number or expression
+    sticking : dict label -> ComplementarityData
+        the condition that closed bodies do not slip, where it is asked for
     """
 
     name: str
     gaps: dict
-    normals: dict
+    distances: dict
+    forces: dict
     touching: dict
     restitution: object
+    sticking: dict
 
 
 def read_contacts(model: Block, wrt: ContinuousSet) -> list[ContactLaw]:
@@ -42,8 +46,12 @@ def read_contacts(model: Block, wrt: ContinuousSet) -> list[ContactLaw]:
     for contact in all_switched_systems(model).contacts:
         label, name = times.split(contact.block)
         if label is not None and contact.touching.active:
-            law = found.setdefault(strip_time(name), ContactLaw(strip_time(name), {}, {}, {}, contact.restitution))
-            law.gaps[label], law.normals[label], law.touching[label] = contact.gap.expr, contact.normal, contact.touching
+            name = strip_time(name)
+            law = found.setdefault(name, ContactLaw(name, {}, {}, {}, {}, contact.restitution, {}))
+            law.gaps[label], law.distances[label] = contact.gap.expr, contact.distance
+            law.forces[label], law.touching[label] = contact.forces, contact.touching
+            if contact.sticking is not None:
+                law.sticking[label] = contact.sticking
     return list(found.values())
 
 
@@ -54,8 +62,8 @@ def declare_impacts(moving: MovingGrid, laws: list[ContactLaw], block: Block) ->
     block.contact = Set(initialize=[law.name for law in laws], ordered=True)
     block.left = Set(initialize=[e.n - 1 for e in moving.grid.elements], ordered=True)
     block.coupled, sparse = Set(dimen=1), {'initialize': 0, 'dense': False}
-    block.impulse, block.above, block.below, block.leaving = (
-        Var(block.contact, block.left, bounds=(0, None), **sparse) for _ in range(4)
+    block.impulse, block.second, block.above, block.below, block.leaving = (
+        Var(block.contact, block.left, bounds=(0, None), **sparse) for _ in range(5)
     )
     block.velocity = Var(block.left, block.coupled, dense=False)
     block.balance, block.parts = Constraint(block.left, block.coupled), Constraint(block.contact, block.left, [1, 2])
@@ -63,17 +71,31 @@ def declare_impacts(moving: MovingGrid, laws: list[ContactLaw], block: Block) ->
     block.direction, block.weights = Var(block.left, block.coupled, dense=False), Constraint(block.left, block.coupled)
     block.slipping = Set(dimen=1)
     block.slip = Complementarity(block.slipping, block.left)
-    kept = (block.impulse, block.above, block.below, block.leaving, block.parts, block.impact, block.velocity, block.balance)
-    return Impacts(laws, block, *kept, block.direction, block.weights, block.slip, {}, {})
+    kept = (block.impulse, block.second, block.above, block.below, block.leaving, block.parts, block.impact)
+    return Impacts(laws, block, *kept, block.velocity, block.balance, block.direction, block.weights, block.slip, {}, {})
 
 
 def with_departures(moving: MovingGrid, conditions: list[TimeComplementarity]) -> list[TimeComplementarity]:
-    """Return the conditions, those of contact forces with Q: closed only from a boundary on at which the bodies do not part."""
+    """Return the conditions, those of contact forces with Q: closed only from a boundary on at which the bodies do not part.
+
+    Bodies that must not slip have no restitution, so that an impulse leaves no velocity with which they part.
+    """
     impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
     if impacts is None:
         return conditions
-    laws = {id(touching): law for law in impacts.laws for touching in law.touching.values()}
+    laws = {id(touching): law for law in impacts.laws if not law.sticking for touching in law.touching.values()}
     return [_with_departures(impacts, c, laws.get(id(next(iter(c.conditions.values())))), moving.grid) for c in conditions]
+
+
+def without_left_slip(moving: MovingGrid, conditions: list[TimeComplementarity]) -> list[TimeComplementarity]:
+    """Return the conditions, those of bodies that must not slip without the slip at the left boundary of an element.
+
+    Between closed elements it is 0 by that of the element before; a second equation would leave the first one no multiplier.  After
+    an impact that of the impulse holds.
+    """
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    known = {id(c) for law in ([] if impacts is None else impacts.laws) for c in law.sticking.values()}
+    return [replace(c, from_left=False) if id(next(iter(c.conditions.values()))) in known else c for c in conditions]
 
 
 def _with_departures(impacts, condition, law, grid):
@@ -89,5 +111,5 @@ def _departure(impacts, law, b):
 
 def impulse_activity(impacts: Impacts, law: ContactLaw, b: int, gap, tiny: float):
     """Return a number that is 1 where an impulse acts at a boundary and 0 where none does, like the activity of eq. (12)."""
-    impulse = impacts.impulse[law.name, b]
+    impulse = impacts.normal_impulse(law.name, b)
     return impulse / (impulse + gap + impacts.above[law.name, b] + impacts.below[law.name, b] + tiny)

@@ -44,11 +44,11 @@ def _is_curved(law):
 
 
 def _stabilise_element(block, law, element, equations, shifts):
-    gap = quicksum(law.gaps[t] for t in dict.fromkeys((element.left, *element.points)))
-    force = quicksum(law.normals[t] for t in element.points)
+    gap = quicksum(law.distances[t] for t in dict.fromkeys((element.left, *element.points)))
+    force = quicksum(force for t in element.points for force in law.forces[t])
     for r, t in enumerate(element.points, start=1):
         drift = block.drift[law.name, element.n, r]
-        gamma = equations.normal_velocity(law.gaps[t], law.normals[t].parent_block(), ComponentSet())
+        gamma = equations.normal_velocity(law.gaps[t], law.forces[t][0].parent_block(), ComponentSet())
         # the opposite sign of gamma would allow a drift that keeps the gap closed while the bodies approach, where both are small
         block.closed.add((law.name, element.n, r), ((gap + NOWHERE) * drift - force * gamma) / (gap + force + NOWHERE) == 0)
         for xdot, slope in equations.gradient(law.gaps[t]):

@@ -52,7 +52,7 @@ def write_impacts(moving: MovingGrid) -> None:
 def _write_boundary(moving, equations, element):
     impacts, label, b = moving.state_jumps.impacts, element.left, element.n - 1
     laws = [law for law in impacts.laws if label in law.gaps]
-    impulses = ComponentMap((law.normals[label], impacts.impulse[law.name, b] if b else 0) for law in laws)
+    impulses = ComponentMap(pair for law in laws for pair in _impulses(impacts, law, label, b))
     groups, after = equations.momentum(impulses), ComponentMap()
     impacts.directions[b] = directions = _directions(impacts, b, groups, equations) if b else ComponentMap()
     swap = {id(nu): beta for nu, beta in directions.items()}
@@ -63,11 +63,16 @@ def _write_boundary(moving, equations, element):
     _add_after(moving.state_jumps, label, b, after)
     moving_states = ComponentSet(v for group in groups for v in group.states)
     for law in laws:
-        gamma = equations.normal_velocity(law.gaps[label], law.normals[label].parent_block(), moving_states)
+        gamma = equations.normal_velocity(law.gaps[label], law.forces[label][0].parent_block(), moving_states)
         _add_parts(impacts, law, b, gamma, replace_expressions(gamma, {id(v): new for v, new in after.items()}))
-        _add_pairs(moving, law, element)
+        (_add_sticking_pairs if law.sticking else _add_pairs)(moving, law, element)
         if not b:
             _check_start(law, label, gamma)
+
+
+def _impulses(impacts, law, label, b):
+    """The forces of a contact, each with its impulse."""
+    return [(force, some[law.name, b] if b else 0) for force, some in zip(law.forces[label], (impacts.impulse, impacts.second))]
 
 
 def _directions(impacts, b, groups, equations):
@@ -142,12 +147,30 @@ def _add_pairs(moving, law, element):
         impacts.parts.add((law.name, b, 2), distance >= 0)
 
 
+def _add_sticking_pairs(moving, law, element):
+    """(24): without restitution; N is free after an element that is closed, where the velocity is 0 by itself."""
+    impacts, b, distance = moving.state_jumps.impacts, element.n - 1, law.distances[element.left]
+    P, N = impacts.above[law.name, b], impacts.below[law.name, b]
+    room = distance - AHEAD * element.length * N
+    if b:
+        # a force that gives the impulse within an element: both are relaxed alike
+        force = impacts.normal_impulse(law.name, b) / element.length
+        impacts.impact.add((law.name, b, 1), complements(force >= 0, distance >= 0))
+        impacts.impact.add((law.name, b, 2), complements(force >= 0, P + N >= 0))
+        room += quicksum(force for t in moving.grid.elements[b - 1].points for force in law.forces[t])
+    if b or not _is_fixed(law.gaps[element.left]):
+        impacts.parts.add((law.name, b, 2), room >= 0)
+
+
+def _is_fixed(expr):
+    return all(v.fixed for v in identify_variables(expr, include_fixed=True))
+
+
 def _check_start(law, label, gamma):
     gap = law.gaps[label]
-    fixed = all(v.fixed for expr in (gap, gamma) for v in identify_variables(expr, include_fixed=True))
-    if fixed and value_or_nan(gap) < APPROACH and value_or_nan(gamma) < -APPROACH:
+    if _is_fixed(gap) and _is_fixed(gamma) and value_or_nan(gap) < APPROACH and value_or_nan(gamma) < -APPROACH:
         raise FesdError(
-            law.normals[label].parent_block(),
+            law.forces[label][0].parent_block(),
             f"contact: the gap is closed at the first time and closes at a rate of {-value_or_nan(gamma):g}; there is no impact at "
             "the first time",
             "start with the velocities after the impact, or a little earlier",

@@ -55,6 +55,8 @@ class TimeComplementarity:
         the sides after the left boundary of an element, where a state jumps there
     departures : dict element number -> VarData
         of a contact force: a further term of the second side at the left boundary of an element (eq. 21)
+    from_left : bool
+        whether a continuous side enters an element with its value at the left boundary too
     has_right_limits : bool
         its argument jumps with the modes or with controls; ``starts`` holds its sides after these boundaries
     """
@@ -68,6 +70,7 @@ class TimeComplementarity:
     follows: bool = False
     starts: dict = field(default_factory=dict)
     departures: dict = field(default_factory=dict)
+    from_left: bool = True
     has_right_limits: bool = False
 
     def points(self, element: Element) -> list[float]:
@@ -79,7 +82,8 @@ class TimeComplementarity:
         values = [self.sides[t][side] for t in self.points(element)]
         if not self.continuous[side]:
             return values
-        if not (element.inputs_change and self.jumps_with_controls[side]) and element.left in self.sides:
+        left = self.from_left and not (element.inputs_change and self.jumps_with_controls[side])
+        if left and element.left in self.sides:
             values.append(self.starts.get(element.n, self.sides[element.left])[side])
         if element.right not in element.points and element.right in self.sides:
             values.append(self.sides[element.right][side])

@@ -35,7 +35,7 @@ from pyomo_fesd.core import (
 from pyomo_fesd.finite_elements.arrivals import add_arrivals
 from pyomo_fesd.finite_elements.chain_of_elements import add_chain
 from pyomo_fesd.finite_elements.coincidences import add_coincidences
-from pyomo_fesd.finite_elements.contacts import read_contacts, with_departures
+from pyomo_fesd.finite_elements.contacts import read_contacts, with_departures, without_left_slip
 from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
 from pyomo_fesd.finite_elements.controls import check_controls, fix_given, hold_controls
 from pyomo_fesd.finite_elements.cross_complementarity import add_cross_complementarity
@@ -272,7 +272,7 @@ def _add_switching(moving, switching, complementarities, continuity, config):
     complementarities = with_mode_limits(moving, complementarities, continuity, config.piecewise_constant)
     warn_unknown(moving, complementarities)
     add_friction_impulses(moving, complementarities)
-    complementarities = with_departures(moving, complementarities)
+    complementarities = without_left_slip(moving, with_departures(moving, complementarities))
     add_cross_complementarity(moving, complementarities, config.cross_complementarity)
     if not switching:
         moving.r.fix(1)

@@ -8,8 +8,8 @@ signal.py, on time_series.py
     time series as inputs
 state_jump.py, projection.py
     jumps of states, states confined to a set
-contact.py, friction.py
-    rigid bodies that touch, dry friction of any force law
+contact.py, on sticking_contact.py, friction.py
+    rigid bodies that touch, those that must not slip, dry friction of any force law
 rules.py
     checks of the rules of these Blocks
 """

@@ -14,9 +14,10 @@ from pyomo.mpec import Complementarity, complements
 from pyomo_fesd.core import Contact, FesdError, switched_systems
 from pyomo_fesd.modeling.friction import add_friction
 from pyomo_fesd.modeling.rules import refuse_wrong_rules, whole_or_none
+from pyomo_fesd.modeling.sticking_contact import add_sticking_contact
 
 
-def contact(*sets, gap, restitution=0, friction=None, slip=None, directions: int = 8) -> Block:
+def contact(*sets, gap, restitution=0, friction=None, slip=None, directions: int = 8, sticks: bool = False) -> Block:
     """Return a Block over ``sets`` with a rigid contact: a gap that is never negative, and the force ``normal`` that keeps it so.
 
     Add ``normal`` to the balances of momentum on which the force acts, with the direction in which it acts on each, as you would
@@ -42,12 +43,16 @@ def contact(*sets, gap, restitution=0, friction=None, slip=None, directions: int
         balances; two components in space, where ``friction[1]`` and ``friction[2]`` are those of the force
     directions : int
         corners of the polygon of friction forces in space (:func:`friction`)
+    sticks : bool
+        True: closed bodies must not slip, as the foot of a walking robot.  This is a condition on the controls, not a law of
+        motion: controls with which the bodies would slip are infeasible, and such a model cannot be simulated.
 
     Raises
     ------
     FesdError
         when the Block is added: for a gap that is not an expression, a restitution that is not between 0 and 1, a negative
-        friction coefficient, and a slip without friction or the other way round
+        friction coefficient, a slip without friction or the other way round, and ``sticks`` without friction, with restitution, or
+        in space
 
     Example
     -------
@@ -62,17 +67,23 @@ def contact(*sets, gap, restitution=0, friction=None, slip=None, directions: int
     refuse_wrong_rules('contact', sets, gap=gap, **({} if slip is None else {'slip': slip}))
     if (friction is None) != (slip is None):
         raise FesdError('contact', "friction and slip belong together, and one of them was not given", "give both, or none")
+    if sticks and (friction is None or not (isinstance(restitution, (int, float)) and restitution == 0)):
+        missing = "no friction" if friction is None else f"restitution={restitution!r}"
+        raise FesdError('contact', f"sticks=True with {missing}", "give friction and slip, and no restitution")
     time = next((s for s in sets if getattr(s, 'ctype', None) is ContinuousSet), None)
 
     def fill(block, *index):
         parent = block.parent_block()
         block.gap = Expression(expr=_gap(block, gap(parent, *index)))
+        e = _restitution(block, _given(restitution, parent, index))
+        mu = None if friction is None else _coefficient(block, _given(friction, parent, index))
+        if sticks:
+            switched_systems(block).contacts.append(add_sticking_contact(block, slip(parent, *index), mu))
+            return
         block.normal = Var(bounds=(0, None), initialize=0)
         block.touching = Complementarity(expr=complements(block.normal >= 0, block.gap >= 0))
-        e = _restitution(block, _given(restitution, parent, index))
-        switched_systems(block).contacts.append(Contact(block, block.gap, block.normal, block.touching, e))
+        switched_systems(block).contacts.append(Contact(block, block.gap, block.gap, (block.normal,), block.touching, e))
         if friction is not None:
-            mu = _coefficient(block, _given(friction, parent, index))
             add_friction(block, 'friction', slip(parent, *index), mu * block.normal, directions, time)
 
     return Block(*sets, rule=whole_or_none(fill))

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block
+from pyomo.core import Block, quicksum
 from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity
 
@@ -57,7 +57,7 @@ def complementarity_modes(model: Block, wrt: ContinuousSet, times: TimeIndex) ->
 
 def _of_contact(contacts, times):
     at = {times.time(contact.block): contact for contact in contacts}
-    return {OPEN: {t: c.gap for t, c in at.items()}, CLOSED: {t: c.normal for t, c in at.items()}}
+    return {OPEN: {t: c.gap for t, c in at.items()}, CLOSED: {t: quicksum(c.forces) for t, c in at.items()}}
 
 
 def _by_mode(by_time, splits):

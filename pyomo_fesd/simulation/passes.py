@@ -32,6 +32,7 @@ class Simulation:
     def __init__(self, model, wrt, inputs, options, timer, deadline):
         self._model, self._timer = model, timer
         self._moving = moving_grids(model)[wrt]
+        _refuse_sticking(self._moving.state_jumps)
         self._grid = self._moving.grid
         self._progress = Progress(wrt, self._grid.stages, deadline)
         self._solver = ElementSolver(model, wrt, inputs, options, timer, self._progress)
@@ -144,3 +145,14 @@ class Simulation:
             for a, b in zip(times, times[1:]):
                 if 0 < b - a < least * (1 - CUT):
                     logger.warning(SHORT_INTERVAL, a, b, least)
+
+
+def _refuse_sticking(jumps):
+    """Refuse contacts that must not slip: where friction cannot hold the bodies, no law says how they move."""
+    sticking = [] if jumps is None or jumps.impacts is None else jumps.impacts.sticking
+    if sticking:
+        raise FesdError(
+            sticking[0],
+            "simulate: its bodies must not slip (sticks=True), which is a condition on the controls and no law of motion",
+            "solve with mpec_hybrid, or simulate a model without sticks",
+        )

@@ -59,7 +59,8 @@ class SimulatedStart:
         finally:
             if not self.found:
                 self.restore()
-        self._further = not self.note and len(moving_grids(model)) == 1
+        grids = list(moving_grids(model).values())
+        self._further = not self.note and len(grids) == 1 and not _sticks(grids[0])
 
     def __enter__(self):
         return self
@@ -85,7 +86,7 @@ class SimulatedStart:
         """
         grids = list(moving_grids(self._model).values())
         applies = self._options.simulate_first is not False and self._options.mode == 'hybrid'
-        if not applies or len(grids) != 1 or grids[0].state_jumps is None:
+        if not applies or len(grids) != 1 or grids[0].state_jumps is None or _sticks(grids[0]):
             return None
         return lambda w, seconds: self._completed(compiled, w, seconds)
 
@@ -173,3 +174,9 @@ class SimulatedStart:
             if v.value != number:
                 v.set_value(number, skip_validation=True)
             v.stale = stale
+
+
+def _sticks(moving):
+    """Whether there are contacts that must not slip, which cannot be simulated."""
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    return impacts is not None and bool(impacts.sticking)

@@ -43,8 +43,8 @@ def set_impulses(moving: MovingGrid, times: TimeIndex, table: TimeTable) -> None
 def _without_impulse(moving, b):
     impacts = moving.state_jumps.impacts
     for law in impacts.laws:
-        if (law.name, b) in impacts.impulse:
-            impacts.impulse[law.name, b].set_value(0.0)
+        for impulse in impacts.impulses(law.name, b):
+            impulse.set_value(0.0)
     for v, after in moving.state_jumps.velocities_after(b):
         if after.is_variable_type():
             set_within_bounds(after, value_or_nan(v))
@@ -58,7 +58,7 @@ def _fit(moving, impacts, b, right):
             set_within_bounds(after, right.get(id(v)))
         elif id(v) in right:
             targets.append((after, right[id(v)]))
-    unknown = [impacts.impulse[law.name, b] for law in impacts.laws if (law.name, b) in impacts.impulse]
+    unknown = [impulse for law in impacts.laws for impulse in impacts.impulses(law.name, b)]
     unknown += list(impacts.directions.get(b, {}).values())
     rows = impacts.between(b)
 
@@ -89,7 +89,7 @@ def set_parts(moving: MovingGrid, times: TimeIndex) -> None:
     impacts: Impacts | None = None if moving.state_jumps is None else moving.state_jumps.impacts
     for element in moving.grid.elements if impacts is not None else ():
         b = element.n - 1
-        if not any((impacts.impulse[law.name, b].value or 0.0) > 0 for law in impacts.laws if (law.name, b) in impacts.impulse):
+        if not any((impulse.value or 0.0) > 0 for law in impacts.laws for impulse in impacts.impulses(law.name, b)):
             for nu, beta in impacts.directions[b].items():
                 set_within_bounds(beta, value_or_nan(times.at(nu, element.points[0])))
         for law in impacts.laws:

@@ -16,7 +16,7 @@ def test_gap_and_force_stand_on_a_block_over_time():
     assert set(m.floor) == set(m.t)
     assert str(m.floor[0].gap.expr) == 'x[0] - 1' and m.floor[0].normal.lb == 0
     (entry,) = switched_systems(m.floor[0]).contacts
-    assert entry.gap is m.floor[0].gap and entry.normal is m.floor[0].normal and entry.restitution == 0
+    assert entry.gap is m.floor[0].gap and entry.forces == (m.floor[0].normal,) and entry.restitution == 0
 
 
 def test_contacts_over_other_sets_are_laws_of_their_own():
@@ -38,7 +38,7 @@ def test_a_clone_has_its_own_contact():
     m.floor = pyomo_fesd.contact(m.t, gap=lambda m, t: m.x[t])
     copy = m.clone()
     (law,) = read_contacts(copy, copy.t)
-    assert law.gaps[0].model() is copy and law.normals[0] is copy.floor[0].normal
+    assert law.gaps[0].model() is copy and law.forces[0][0] is copy.floor[0].normal
 
 
 @pytest.mark.parametrize('gap', [lambda m, t: m.x[t] >= 0, lambda m, t: None, lambda m, t: 1.0])

@@ -126,10 +126,7 @@ def _no_slip(m, force):
 def _with_contact(elements=ELEMENTS, ncp=NCP, no_slip=True, guess='start', **options):
     """``no_slip`` False leaves out the condition on the foot; Coulomb's law remains."""
     m = _bodies(guess)
-    m.ground = pyomo_fesd.contact(m.t, gap=lambda m, t: gap(_at(m, t)[0], pyo), friction=FRICTION, slip=_slip)
-    if no_slip:
-        _no_slip(m, lambda m, t: m.ground[t].normal)
-        options['continuous'] = [m.forth, m.back]
+    m.ground = pyomo_fesd.contact(m.t, gap=lambda m, t: gap(_at(m, t)[0], pyo), friction=FRICTION, slip=_slip, sticks=no_slip)
     m.way = pyo.Constraint(m.i, m.t, rule=lambda m, i, t: m.dq[i, t] == m.v[i, t])
 
     @m.Constraint(m.i, m.t)

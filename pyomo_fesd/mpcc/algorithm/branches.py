@@ -13,8 +13,12 @@ from pyomo_fesd.mpcc.subproblems import G_ZERO, MATTERS, Stationarity
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
+#: So much from a point whose branch NLP did not end: smaller steps only go on in a branch that Ipopt cannot finish.
+UNFINISHED = 1e-3
 #: Attempts at a branch NLP before it counts as infeasible.
 TRIES = 2
+#: A failed attempt came near if it leaves a violation of the rows below this, or has reduced it to this part.
+NEAR, NEARER = 1e-2, 0.1
 #: Iterations of the first and of the second attempt; and how many more if they only lead to a feasible point (None: no limit).
 FIRST, SECOND = 30, 100
 MORE = {FIRST: SECOND, SECOND: None}
@@ -218,7 +222,7 @@ class Branches:
     def descend(self, point, worth):
         """A better point, or None; a point that is not ``worth`` a descent only gets the check of its certificate."""
         size = max(1.0, abs(point.f))
-        enough = point.f - PROGRESS * size
+        enough = point.f - (PROGRESS if point.nlp.solved else UNFINISHED) * size
         if point.certificate.grade is Stationarity.DESCENT:
             return self._step_down(point, enough) if worth else None
         if point.certificate.grade is not Stationarity.B:
@@ -286,7 +290,8 @@ class Branches:
         solved, equal = self._solve(w, zero, duals, below, **more)
         if solved is not None and not solved.solved and more.get('max_iter') in MORE:
             # feasible, so the branch has a solution, but not at its minimum yet
-            solved, equal = self._solve(solved.w, zero, solved, below, **more | {'max_iter': MORE[more['max_iter']]})
+            again, decided = self._solve(solved.w, zero, solved, below, **more | {'max_iter': MORE[more['max_iter']]})
+            solved, equal = (solved, equal) if again is None else (again, decided)
         if solved is None:
             return None
         f = self._c.evaluate(solved.w).f
@@ -299,10 +304,26 @@ class Branches:
 
     def _solve(self, w, zero, duals, below, **more):
         """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force."""
-        first = self._subsolves.branch(w, zero, None, 1.0, duals=duals, **more)
+        first = self._subsolves.attempt(w, zero, None, 1.0, duals=duals, **more)
+        if first is not None and not self._subsolves.usable(first):
+            return self._decided_at_once(w, zero, first, **more)
         if first is not None and first.solved and self._c.evaluate(first.w).f > below + AS_GOOD * max(1.0, abs(below)):
             return None, None
         return self.decided(first, zero, **more)
+
+    def _decided_at_once(self, w, zero, first, **more):
+        """One NLP with the decisions that the sides of the branch ask for, after an attempt ``first`` without them that came near.
+
+        Without decisions places without a change may shrink to nothing, and the equations of what they hold lose their rank.
+        """
+        at_sides = self._subsolves.on_sides(w, zero) if self._c.eta.numel() else None
+        if at_sides is None or self._subsolves.violation(first.w) > max(NEAR, NEARER * self._subsolves.violation(at_sides)):
+            return None, None
+        equal = self._c.evaluate(at_sides).eta > self._tolerances.eta
+        solved = self._subsolves.branch(w, zero, equal, 0.0, far=True, **more | {'max_iter': None})
+        if solved is None or np.any((self._c.evaluate(solved.w).eta > self._tolerances.eta) & ~equal):
+            return None, None
+        return solved, equal
 
     def decided(self, first, zero, apart=False, **more):
         """The second NLP, after the solution ``first`` of a branch, and the decisions in force; none of ``apart``."""

@@ -83,6 +83,10 @@ class Subsolves:
         """The result of a branch NLP, usable or not; None if the branch contradicts the bounds."""
         return self._nlp('branch', 0.0, lambda: self._branches().solve(w, zero, equal, weight, **more))
 
+    def on_sides(self, w, zero):
+        """``w`` within the bounds of a branch; None if these contradict each other."""
+        return self._branches().on_sides(w, zero)
+
     def _branches(self):
         return self._build('branch', lambda make: Branch(self._c, self._sides, make), 'branch')
 

@@ -28,6 +28,8 @@ NEAR = {
     'constr_viol_tol': 1e-11,
     'compl_inf_tol': 1e-10,
 }
+#: One that starts elsewhere is left to Ipopt's own centring.
+FAR = {name: NEAR[name] for name in ('constr_viol_tol', 'compl_inf_tol')}
 #: Status of a branch that has a solution only if places of fillings are open.
 UNDECIDED = 'fillings undecided'
 #: A row without free variables, or one of more equations than free variables, may miss its bounds by this much.
@@ -52,9 +54,10 @@ class Branch:
         nlp = composed(c, Outer(z, ca.SX(0, 1), weight, ca.SX(0), rows, weight))
         self._pattern = csr_pattern(nlp.derivatives.jacobian)
         self._values = ca.Function('rows', [nlp.x, nlp.p], [nlp.g])
-        self._nlp = make('branch', nlp.x, nlp.p, nlp.f, nlp.g, NEAR, nlp.derivatives)
+        given = nlp.x, nlp.p, nlp.f, nlp.g
+        self._nlp, self._far = (make('branch', *given, budget, nlp.derivatives) for budget in (NEAR, FAR))
 
-    def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None, settled=ROW_TOLERANCE):
+    def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None, settled=ROW_TOLERANCE, far=False):
         """Solve the branch ``zero`` from ``w``.
 
         Parameters
@@ -72,12 +75,14 @@ class Branch:
         max_iter : int, optional
         settled : float
             violation of rows without free variables that is accepted
+        far : bool
+            whether ``w`` may be far from the solution
 
         Returns
         -------
         NlpResult, or None if the assignment contradicts the bounds
         """
-        options = equal, weight, box, duals, max_iter, settled
+        options = equal, weight, box, duals, max_iter, settled, far
         result = self._solve(w, zero, *options)
         if not self._c.fillings or (result is not None and result.solved):
             return result
@@ -114,7 +119,7 @@ class Branch:
         new[extents] += np.linalg.lstsq(A, np.concatenate([(c.lbg - at.g)[own], -c.decided(w)[equal]]), rcond=None)[0]
         return np.clip(new, c.lbx, c.ubx)
 
-    def _solve(self, w, zero, equal, weight, box, duals, max_iter, settled):
+    def _solve(self, w, zero, equal, weight, box, duals, max_iter, settled, far):
         c = self._c
         zero, w = settle(c, self._sides, w, zero), with_shares(c.fillings, w)
         bounds = self._bounds(zero)
@@ -129,7 +134,13 @@ class Branch:
         if box is not None:
             free = lbx < ubx
             lbx, ubx = np.where(free, np.maximum(lbx, box[0]), lbx), np.where(free, np.minimum(ubx, box[1]), ubx)
-        return self._nlp.solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, self._start(duals), max_iter)
+        nlp = self._far if far else self._nlp
+        return nlp.solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, self._start(duals), max_iter)
+
+    def on_sides(self, w, zero):
+        """Return ``w`` within the bounds of the branch ``zero``; None if these contradict each other."""
+        bounds = self._bounds(settle(self._c, self._sides, w, zero))
+        return None if bounds is None else np.clip(w, *bounds)
 
     def infeasible(self, zero) -> bool:
         """Whether a linear program shows that the branch ``zero``, in which pairs may be FREE, has no point."""

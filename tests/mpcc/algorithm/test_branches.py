@@ -1,5 +1,7 @@
 """Branches: solved once, certified, kept if better, and left where the LPEC shows a way down."""
 
+from dataclasses import replace
+
 import numpy as np
 import pyomo.environ as pyo
 import pytest
@@ -7,6 +9,7 @@ from problems import mpcc_collection, small_mpccs
 from problems.parts import parts
 from pyomo.mpec import Complementarity, complements
 
+from pyomo_fesd.core import BranchConstraint, homotopy_hints
 from pyomo_fesd.mpcc.algorithm import branches
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Stop
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO, active_sets
@@ -214,3 +217,68 @@ def test_a_point_beyond_all_measure_is_unbounded_only_where_the_objective_fell()
     p = parts(m)
     p.branches.explore_from(np.array(p.point(x=1e20, y=0.0)), False)
     assert p.run.point is None or p.run.point.f == pytest.approx(0, abs=1e-6)
+
+
+# Decisions of the sides
+
+
+def with_a_decision():
+    """x, y >= 0 with one of them 0; where x > 0, z is 1."""
+    m = small_mpccs.pair(1.0, 0.0)
+    m.z = pyo.Var(initialize=3.0)
+    m.row = pyo.Constraint(expr=m.x * m.z == 2.0)
+    m.f = pyo.Objective(expr=(m.x - 1) ** 2 + m.y**2)
+    m.one = pyo.Constraint(expr=m.z == 1)
+    m.one.deactivate()
+    m.decision = Complementarity(expr=complements((m.z - 1) ** 2 >= 0, m.x / (m.x + m.y) >= 0))
+    homotopy_hints(m).branch_constraints.append(BranchConstraint(m.decision, m.one))
+    return m
+
+
+@pytest.mark.parametrize('left, found', [(5e-3, True), (1.0, False)])
+def test_a_branch_that_fails_near_its_rows_is_solved_with_the_decisions_of_its_sides(monkeypatch, left, found):
+    p = parts(with_a_decision())
+    attempt = p.subsolves.attempt
+
+    def without_decisions(w, zero, equal, *more, **options):
+        result = attempt(w, zero, equal, *more, **options)
+        if equal is not None:
+            return result
+        row = p.point(x=1.0, y=0.0, z=2.0 + left)
+        return replace(result, w=np.array(row), status='User_Requested_Stop')
+
+    monkeypatch.setattr(p.subsolves, 'attempt', without_decisions)
+    zero = np.full(p.compiled.pairs, H_ZERO)
+    point = p.branches.certified(p.compiled.x0, zero)
+    assert (point is not None) == found
+    if found:
+        assert point.w == pytest.approx(p.point(x=2.0, y=0.0, z=1.0), abs=1e-6) and point.equal.all()
+
+
+def test_a_feasible_point_is_kept_where_the_nlp_from_there_fails(monkeypatch):
+    p = parts(two_minima(1.0, 0.0))
+    attempt, calls = p.subsolves.attempt, []
+
+    def stopped_then_failed(*given, **options):
+        calls.append(options['max_iter'])
+        result = attempt(*given, **options)
+        return replace(result, status='User_Requested_Stop') if len(calls) == 1 else None
+
+    monkeypatch.setattr(p.subsolves, 'attempt', stopped_then_failed)
+    point = p.branches.certified(p.compiled.x0, np.array([H_ZERO]), max_iter=branches.FIRST)
+    assert calls == [branches.FIRST, branches.SECOND]
+    assert point.w == pytest.approx(p.point(x=1.0, y=0.0), abs=1e-6)
+
+
+def test_from_a_branch_that_did_not_end_only_large_steps_are_worth_it(monkeypatch):
+    monkeypatch.setattr(branches, '_settles', lambda better, point: False)
+    p = parts(trap(), lpec='reduced')
+    point = p.branches.certified(np.zeros(2), np.array([G_ZERO]))
+    unfinished = replace(point, nlp=replace(point.nlp, status='Maximum_Iterations_Exceeded'))
+    # from 1 to 0
+    for least, found in ((0.5, True), (1.5, False)):
+        monkeypatch.setattr(branches, 'UNFINISHED', least)
+        p.branches.forget()
+        assert (p.branches.descend(unfinished, True) is not None) == found
+    p.branches.forget()
+    assert p.branches.descend(point, True).f == pytest.approx(0, abs=1e-6)
