@@ -7,8 +7,9 @@ from collections import Counter
 
 import numpy as np
 
+from pyomo_fesd.mpcc.algorithm.branch_solutions import FIRST, SECOND, BranchSolutions
 from pyomo_fesd.mpcc.algorithm.search import FEW, Verdict, exhaust, leaves
-from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Stop
+from pyomo_fesd.mpcc.algorithm.state import Point
 from pyomo_fesd.mpcc.subproblems import G_ZERO, MATTERS, Stationarity
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
@@ -17,11 +18,6 @@ PROGRESS = 1e-8
 UNFINISHED = 1e-3
 #: Attempts at a branch NLP before it counts as infeasible.
 TRIES = 2
-#: A failed attempt came near if it leaves a violation of the rows below this, or has reduced it to this part.
-NEAR, NEARER = 1e-2, 0.1
-#: Iterations of the first and of the second attempt; and how many more if they only lead to a feasible point (None: no limit).
-FIRST, SECOND = 30, 100
-MORE = {FIRST: SECOND, SECOND: None}
 #: The trust region of a descent step shrinks by this factor, so many times.
 SHRINK, SHRINKS = 0.1, 3
 #: Ipopt leaves sides without a multiplier at the root of its tolerance.  Those below this count as zero as well, if this descends
@@ -33,13 +29,8 @@ WIDE = {'mip_abs_gap': 1e-6, 'mip_max_nodes': 100}
 SUGGESTED = 50
 #: Trust region of the LPEC that searches for any feasible branch.
 SEARCH_RADIUS = 1e3
-#: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
-#: one it came from an unbounded relaxation.
-UNBOUNDED = 1e15
 #: A variable nearer to its lower bound than this is at it.
 AT_BOUND = 1e-6
-#: A more even solution may cost this much more, relative: the error of uneven elements, not another minimum.
-AS_GOOD = 1e-4
 
 
 class Branches:
@@ -62,6 +53,7 @@ class Branches:
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
         self._attempts, self._solved, self._exhausted = Counter(), {}, {}
         self._first = SECOND if patient else FIRST
+        self.solutions = BranchSolutions(subsolves)
 
     # called by the algorithm
 
@@ -102,7 +94,7 @@ class Branches:
         if not self._c.eta.numel():
             return False
         zero = self._subsolves.sets(w, self._tolerances.biactive).zero
-        result, equal = self._imposed(w, zero, True, self._subsolves.branch, max_iter=FIRST)
+        result, equal = self.solutions.imposed(w, zero, True, self._subsolves.branch, max_iter=FIRST)
         if result is None or not result.solved or np.any((self._c.evaluate(result.w).eta > self._tolerances.eta) != equal):
             return False
         certificate = self._subsolves.certify(result, equal)
@@ -131,7 +123,7 @@ class Branches:
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for neighbour in self._c.neighbours:
             zero = self.zero_sides(point, neighbour) if neighbour.short.size else None
-            found = None if zero is None else self.certified(point.w, zero, max_iter=SECOND, below=point.f)
+            found = None if zero is None else self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f)
             if is_below(found, enough):
                 return found
         return None
@@ -149,7 +141,7 @@ class Branches:
 
     def _release(self, point):
         zero = self._subsolves.sets(point.w, self._tolerances.biactive).zero
-        self.improve_from(self.certified(point.w, zero, max_iter=SECOND), True)
+        self.improve_from(self.solutions.certified(point.w, zero, max_iter=SECOND), True)
 
     def zero_sides(self, point, neighbour, always=False):
         """The zero sides of a neighbouring branch of ``point``; None if it need not be tried."""
@@ -235,7 +227,7 @@ class Branches:
         step, enough = point.certificate.lpec, point.f - MATTERS * abs(point.f)
         if step is None or not step.matters:
             return None
-        found = (self.certified(w, step.zero, max_iter=SECOND) for w in (point.w + step.d, point.w))
+        found = (self.solutions.certified(w, step.zero, max_iter=SECOND) for w in (point.w + step.d, point.w))
         return next((better for better in found if is_below(better, enough)), None)
 
     def _step_down(self, point, enough):
@@ -252,7 +244,7 @@ class Branches:
             if not step.solved or step.descent == 0.0:
                 return None
             reach = radius * np.maximum(1.0, np.abs(w))
-            better = self.certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=self._first)
+            better = self.solutions.certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=self._first)
         return better if is_below(better, enough) or _settles(better, point) else None
 
     def _beyond(self, point, enough, tolerance, clear, limits=None):
@@ -278,75 +270,12 @@ class Branches:
         self._attempts[key] += TRIES if final and duals is None else 1
         last = self._attempts[key] >= TRIES
         duals = None if last else duals
-        point = self.certified(w, zero, duals=duals, max_iter=SECOND if final or last else self._first, **more)
+        point = self.solutions.certified(w, zero, duals=duals, max_iter=SECOND if final or last else self._first, **more)
         if point is None and final and duals is not None:
-            point = self.certified(w, zero, duals=None, **more)
+            point = self.solutions.certified(w, zero, duals=None, **more)
         if point is not None and point.certificate.grade is not Stationarity.DESCENT:
             self._attempts[key], self._solved[key] = TRIES, point.f
         return point
-
-    def certified(self, w, zero, duals=None, below=np.inf, **more):
-        """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one."""
-        solved, equal = self._solve(w, zero, duals, below, **more)
-        if solved is not None and not solved.solved and more.get('max_iter') in MORE:
-            # feasible, so the branch has a solution, but not at its minimum yet
-            again, decided = self._solve(solved.w, zero, solved, below, **more | {'max_iter': MORE[more['max_iter']]})
-            solved, equal = (solved, equal) if again is None else (again, decided)
-        if solved is None:
-            return None
-        f = self._c.evaluate(solved.w).f
-        if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
-            if f < self._c.evaluate(self._c.x0).f:
-                raise Stop(Outcome.UNBOUNDED)
-            return None
-        certificate = self._subsolves.certify(solved, equal)
-        return Point(solved, f, certificate, equal) if certificate.feasible else None
-
-    def _solve(self, w, zero, duals, below, **more):
-        """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force."""
-        first = self._subsolves.attempt(w, zero, None, 1.0, duals=duals, **more)
-        if first is not None and not self._subsolves.usable(first):
-            return self._decided_at_once(w, zero, first, **more)
-        if first is not None and first.solved and self._c.evaluate(first.w).f > below + AS_GOOD * max(1.0, abs(below)):
-            return None, None
-        return self.decided(first, zero, **more)
-
-    def _decided_at_once(self, w, zero, first, **more):
-        """One NLP with the decisions that the sides of the branch ask for, after an attempt ``first`` without them that came near.
-
-        Without decisions places without a change may shrink to nothing, and the equations of what they hold lose their rank.
-        """
-        at_sides = self._subsolves.on_sides(w, zero) if self._c.eta.numel() else None
-        if at_sides is None or self._subsolves.violation(first.w) > max(NEAR, NEARER * self._subsolves.violation(at_sides)):
-            return None, None
-        equal = self._c.evaluate(at_sides).eta > self._tolerances.eta
-        solved = self._subsolves.branch(w, zero, equal, 0.0, far=True, **more | {'max_iter': None})
-        if solved is None or np.any((self._c.evaluate(solved.w).eta > self._tolerances.eta) & ~equal):
-            return None, None
-        return solved, equal
-
-    def decided(self, first, zero, apart=False, **more):
-        """The second NLP, after the solution ``first`` of a branch, and the decisions in force; none of ``apart``."""
-        if first is None or not self._c.eta.numel():
-            return first, None
-        return self._imposed(first.w, zero, ~np.asarray(apart), self._subsolves.branch, duals=first, **more)
-
-    def beside(self, w):
-        """The result, usable or not, of the branch NLP that ``w`` names with the decisions in force there, and these.
-
-        ``w`` is exactly complementary, and its decisions hold.  None if the bounds of the branch contradict each other.
-        """
-        zero = self._subsolves.sets(w, self._tolerances.biactive).zero
-        return self._imposed(w, zero, True, self._subsolves.attempt)
-
-    def _imposed(self, w, zero, among, solve, **more):
-        """A branch NLP from ``w`` with the decisions that its eta asks for, ``among`` some; a tentative one only if it can be."""
-        equal = (self._c.evaluate(w).eta > self._tolerances.eta) & among
-        solved = solve(w, zero, equal, 0.0, **more)
-        if not (solved and self._subsolves.usable(solved)) and np.any(equal & self._c.tentative):
-            equal = equal & ~self._c.tentative
-            solved = solve(w, zero, equal, 0.0, **more)
-        return solved, equal
 
 
 def _settles(better, point):

@@ -14,7 +14,8 @@ from functools import partial
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.arrivals import NONE, Entered, branches
-from pyomo_fesd.mpcc.algorithm.branches import AS_GOOD, PROGRESS, SECOND
+from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND
+from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
 from pyomo_fesd.mpcc.algorithm.insertions import OrdersByInsertion
 from pyomo_fesd.mpcc.algorithm.state import Point
 from pyomo_fesd.mpcc.algorithm.subsolves import INFEASIBLE
@@ -177,7 +178,7 @@ class Coincidences:
         if first.solved and self._is_above(point, first):
             return OPEN, None
         apart = self._decides(point.w, way.extents)
-        solved, equal = self._branches.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
+        solved, equal = self._branches.solutions.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
         if first.solved and (solved is None or not solved.solved):
             # without decisions there is more room: an order that does not descend then does not descend with them
             solved, equal = self._subsolves.attempt(first.w, zero, None, 0.0, **more), np.zeros_like(apart)
@@ -195,7 +196,7 @@ class Coincidences:
         """A point in the branch that is better than the incumbent; or OPEN."""
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for start in (w + d, w):
-            found = self._branches.certified(start, zero, max_iter=SECOND)
+            found = self._branches.solutions.certified(start, zero, max_iter=SECOND)
             if found is not None and found.f <= enough:
                 return found
         return OPEN

@@ -113,7 +113,7 @@ class Completions:
             self._possible = self._possible or is_complete
             if is_complete:
                 self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
-            result, equal = self._branches.beside(completed)
+            result, equal = self._branches.solutions.beside(completed)
             if result is not None and self._subsolves.usable(result):
                 self._keep(result, equal)
             if result is None or not result.stopped:

@@ -10,7 +10,8 @@ Leaves: a certified one that is more even, or better.
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branches import AS_GOOD, AT_BOUND, PROGRESS, SECOND, is_below
+from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND
+from pyomo_fesd.mpcc.algorithm.branches import AT_BOUND, PROGRESS, is_below
 
 #: A point is more even than another if its deviations are smaller by this part.
 EVENER = 1e-3
@@ -77,7 +78,7 @@ class Evenness:
         from a solution that is not above ``worth``.
         """
         size = max(1.0, abs(point.f))
-        found = self._branches.certified(start, zero, max_iter=SECOND)
+        found = self._branches.solutions.certified(start, zero, max_iter=SECOND)
         if not is_below(found, point.f + AS_GOOD * size):
             return None
         found = self._descended(found) if found.f <= worth else found

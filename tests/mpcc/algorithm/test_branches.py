@@ -10,7 +10,7 @@ from problems.parts import parts
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import BranchConstraint, homotopy_hints
-from pyomo_fesd.mpcc.algorithm import branches
+from pyomo_fesd.mpcc.algorithm import branch_solutions, branches
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Stop
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO, active_sets
 from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
@@ -249,7 +249,7 @@ def test_a_branch_that_fails_near_its_rows_is_solved_with_the_decisions_of_its_s
 
     monkeypatch.setattr(p.subsolves, 'attempt', without_decisions)
     zero = np.full(p.compiled.pairs, H_ZERO)
-    point = p.branches.certified(p.compiled.x0, zero)
+    point = p.branches.solutions.certified(p.compiled.x0, zero)
     assert (point is not None) == found
     if found:
         assert point.w == pytest.approx(p.point(x=2.0, y=0.0, z=1.0), abs=1e-6) and point.equal.all()
@@ -265,15 +265,15 @@ def test_a_feasible_point_is_kept_where_the_nlp_from_there_fails(monkeypatch):
         return replace(result, status='User_Requested_Stop') if len(calls) == 1 else None
 
     monkeypatch.setattr(p.subsolves, 'attempt', stopped_then_failed)
-    point = p.branches.certified(p.compiled.x0, np.array([H_ZERO]), max_iter=branches.FIRST)
-    assert calls == [branches.FIRST, branches.SECOND]
+    point = p.branches.solutions.certified(p.compiled.x0, np.array([H_ZERO]), max_iter=branch_solutions.FIRST)
+    assert calls == [branch_solutions.FIRST, branch_solutions.SECOND]
     assert point.w == pytest.approx(p.point(x=1.0, y=0.0), abs=1e-6)
 
 
 def test_from_a_branch_that_did_not_end_only_large_steps_are_worth_it(monkeypatch):
     monkeypatch.setattr(branches, '_settles', lambda better, point: False)
     p = parts(trap(), lpec='reduced')
-    point = p.branches.certified(np.zeros(2), np.array([G_ZERO]))
+    point = p.branches.solutions.certified(np.zeros(2), np.array([G_ZERO]))
     unfinished = replace(point, nlp=replace(point.nlp, status='Maximum_Iterations_Exceeded'))
     # from 1 to 0
     for least, found in ((0.5, True), (1.5, False)):

@@ -1,0 +1,90 @@
+"""Solutions of branch NLPs: in one NLP, or in two where pairs are to be decided (eq. 13), with the certificate of the LPEC.
+
+Takes: values near a branch and its zero sides.
+Leaves: a ``Point``; None where the branch has no solution.
+"""
+
+import numpy as np
+
+from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Stop
+
+#: Iterations of the first and of the second attempt; and how many more if they only lead to a feasible point (None: no limit).
+FIRST, SECOND = 30, 100
+MORE = {FIRST: SECOND, SECOND: None}
+#: A failed attempt came near if it leaves a violation of the rows below this, or has reduced it to this part.
+NEAR, NEARER = 1e-2, 0.1
+#: A more even solution may cost this much more, relative: the error of uneven elements, not another minimum.
+AS_GOOD = 1e-4
+#: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
+#: one it came from an unbounded relaxation.
+UNBOUNDED = 1e15
+
+
+class BranchSolutions:
+    """The solutions of the branches of one run; ``subsolves`` are its NLPs."""
+
+    def __init__(self, subsolves):
+        self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
+
+    def certified(self, w, zero, duals=None, below=np.inf, **more):
+        """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one."""
+        solved, equal = self._solve(w, zero, duals, below, **more)
+        if solved is not None and not solved.solved and more.get('max_iter') in MORE:
+            # feasible, so the branch has a solution, but not at its minimum yet
+            again, decided = self._solve(solved.w, zero, solved, below, **more | {'max_iter': MORE[more['max_iter']]})
+            solved, equal = (solved, equal) if again is None else (again, decided)
+        if solved is None:
+            return None
+        f = self._c.evaluate(solved.w).f
+        if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
+            if f < self._c.evaluate(self._c.x0).f:
+                raise Stop(Outcome.UNBOUNDED)
+            return None
+        certificate = self._subsolves.certify(solved, equal)
+        return Point(solved, f, certificate, equal) if certificate.feasible else None
+
+    def _solve(self, w, zero, duals, below, **more):
+        """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force."""
+        first = self._subsolves.attempt(w, zero, None, 1.0, duals=duals, **more)
+        if first is not None and not self._subsolves.usable(first):
+            return self._decided_at_once(w, zero, first, **more)
+        if first is not None and first.solved and self._c.evaluate(first.w).f > below + AS_GOOD * max(1.0, abs(below)):
+            return None, None
+        return self.decided(first, zero, **more)
+
+    def _decided_at_once(self, w, zero, first, **more):
+        """One NLP with the decisions that the sides of the branch ask for, after an attempt ``first`` without them that came near.
+
+        Without decisions places without a change may shrink to nothing, and the equations of what they hold lose their rank.
+        """
+        at_sides = self._subsolves.on_sides(w, zero) if self._c.eta.numel() else None
+        if at_sides is None or self._subsolves.violation(first.w) > max(NEAR, NEARER * self._subsolves.violation(at_sides)):
+            return None, None
+        equal = self._c.evaluate(at_sides).eta > self._tolerances.eta
+        solved = self._subsolves.branch(w, zero, equal, 0.0, far=True, **more | {'max_iter': None})
+        if solved is None or np.any((self._c.evaluate(solved.w).eta > self._tolerances.eta) & ~equal):
+            return None, None
+        return solved, equal
+
+    def decided(self, first, zero, apart=False, **more):
+        """The second NLP, after the solution ``first`` of a branch, and the decisions in force; none of ``apart``."""
+        if first is None or not self._c.eta.numel():
+            return first, None
+        return self.imposed(first.w, zero, ~np.asarray(apart), self._subsolves.branch, duals=first, **more)
+
+    def beside(self, w):
+        """The result, usable or not, of the branch NLP that ``w`` names with the decisions in force there, and these.
+
+        ``w`` is exactly complementary, and its decisions hold.  None if the bounds of the branch contradict each other.
+        """
+        zero = self._subsolves.sets(w, self._tolerances.biactive).zero
+        return self.imposed(w, zero, True, self._subsolves.attempt)
+
+    def imposed(self, w, zero, among, solve, **more):
+        """A branch NLP from ``w`` with the decisions that its eta asks for, ``among`` some; a tentative one only if it can be."""
+        equal = (self._c.evaluate(w).eta > self._tolerances.eta) & among
+        solved = solve(w, zero, equal, 0.0, **more)
+        if not (solved and self._subsolves.usable(solved)) and np.any(equal & self._c.tentative):
+            equal = equal & ~self._c.tentative
+            solved = solve(w, zero, equal, 0.0, **more)
+        return solved, equal
