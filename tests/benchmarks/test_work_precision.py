@@ -145,7 +145,7 @@ def test_errors_of_the_known_quantities():
 def test_a_front_holds_the_runs_that_no_other_run_beats():
     rows = pd.DataFrame(
         {
-            'total': [1.0, 2.0, 3.0, 4.0, 0.5],
+            'cpu': [1.0, 2.0, 3.0, 4.0, 0.5],
             'error': [1e-2, 1e-1, 1e-4, 1e-3, 1e-9],
             'claimed': [True, True, True, True, False],
         }
