@@ -26,8 +26,8 @@ from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets, Stationarity, Verdic
 PATIENCE = 300
 #: A place nearer to its least extent than this may be none: NLP solvers leave it a little above its bound.
 NEAR_BOUND = 1e-4
-#: Outcomes of an order: it leads to no better point; or that could not be shown.
-SETTLED, OPEN = 'settled', 'open'
+#: Outcomes of an order: it leads to no better point; that could not be shown; or no branch on this grid contains the incumbent.
+SETTLED, OPEN, ABSENT = 'settled', 'open', 'absent'
 
 
 @dataclass(frozen=True)
@@ -108,8 +108,11 @@ class Coincidences:
         verdicts = [judge() for judge in order.judges]
         if Verdict.IMPOSSIBLE in verdicts or Verdict.NO_DESCENT in verdicts:
             return SETTLED
-        # that a branch with a place to spare does not contain the point proves nothing: there may be no place to spare
-        return self._first(partial(self._try, point), order.ways)
+        found = self._first(partial(self._try, point), order.ways)
+        if found is ABSENT:
+            # no branch of this order contains the point, but an inserted place may grow
+            return OPEN if Verdict.DESCENT in verdicts else SETTLED
+        return found
 
     def _is_flat(self, point):
         """Whether no direction descends, whatever the constraints."""
@@ -153,14 +156,15 @@ class Coincidences:
         enough = self._tolerances.descent
         with self._c.vanishing(way.extents):
             start, equal = self._beside(point, way)
-            if start is OPEN or self._is_above(point, start):
-                return OPEN
+            if start in (ABSENT, OPEN):
+                return start
+            if self._is_another(point, start):
+                return ABSENT
             gamma = np.zeros(len(way.zero), dtype=bool)
             gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
             sets = ActiveSets(self._subsolves.settled(start.w, way.zero), gamma)
             w = self._subsolves.at_limit(start.w, sets.zero, way.extents, point.w[way.extents].max())
-            if w is None:
-                return OPEN
+            w = start.w if w is None else w
             step = self._subsolves.lpec(w, sets, self._tolerances.radius, equal, multipliers=-start.lam_g, enough=enough)
         if not step.solved:
             return OPEN
@@ -174,9 +178,9 @@ class Coincidences:
         more['box'][0][way.extents] = 0.0
         first = self._subsolves.attempt(start, zero, None, 1.0, **more)
         if first is None or first.status in INFEASIBLE:
-            return OPEN, None
-        if first.solved and self._is_above(point, first):
-            return OPEN, None
+            return ABSENT, None
+        if first.solved and self._c.evaluate(first.w).f > point.f + AS_GOOD * max(1.0, abs(point.f)):
+            return ABSENT, None
         apart = self._decides(point.w, way.extents)
         solved, equal = self._branches.solutions.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
         if first.solved and (solved is None or not solved.solved):
@@ -184,9 +188,9 @@ class Coincidences:
             solved, equal = self._subsolves.attempt(first.w, zero, None, 0.0, **more), np.zeros_like(apart)
         return (solved, equal) if solved is not None and solved.solved else (OPEN, None)
 
-    def _is_above(self, point, other):
-        """Whether another solution does not meet the incumbent."""
-        return self._c.evaluate(other.w).f > point.f + AS_GOOD * max(1.0, abs(point.f))
+    def _is_another(self, point, other):
+        """Whether another solution does not meet the incumbent: its places are not the same."""
+        return abs(self._c.evaluate(other.w).f - point.f) > AS_GOOD * max(1.0, abs(point.f))
 
     def _decides(self, w, variables):
         """The decisions that involve variables: beside a place of extent zero nothing is decided, as changes lie on both sides."""
