@@ -7,7 +7,7 @@ from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Constraint, Var
 from pyomo.core.base.block import BlockData
 from pyomo.dae import ContinuousSet, DerivativeVar
-from pyomo.gdp import Disjunct
+from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd.core.errors import FesdError
 
@@ -259,10 +259,11 @@ def derivatives(block, wrt):
 
 
 def _blocks_without_time(block, wrt):
-    """``block`` and those below it that ``wrt`` does not index."""
+    """``block`` and those below it that ``wrt`` does not index, without the disjuncts of a Disjunction of mere expressions."""
     yield block
+    nameless = {id(d._autodisjuncts) for d in block.component_objects(Disjunction, descend_into=False)}
     for inner in block.component_objects((Block, Disjunct), descend_into=False):
-        if not is_indexed_by(inner, wrt):
+        if not is_indexed_by(inner, wrt) and id(inner) not in nameless:
             for data in inner.values():
                 yield from _blocks_without_time(data, wrt)
 

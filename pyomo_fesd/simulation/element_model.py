@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 
 import pyomo.environ as pyo
-from pyomo.core.expr.visitor import replace_expressions
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import FesdError, Pair, variables_of
+from pyomo_fesd.core import FesdError, Pair, exchanged, variables_of
 from pyomo_fesd.simulation.element_equations import ElementEquations
 
 
@@ -50,7 +49,7 @@ class ElementModel:
         unknown = [v for v in variables_of([row]) if self._copies[id(v)].parent_component() is self.model.unknown]
         if not unknown:
             return None
-        added = self.model.row.add(replace_expressions(row, self._copies))
+        added = self.model.row.add(exchanged(row, self._copies))
         # the scale of a row is that of its variables, if the user has given all of them a factor
         given = [factors.get(v) for v in unknown if v is not pattern.length]
         if given and None not in given:
@@ -61,7 +60,7 @@ class ElementModel:
         """Add ``pairs`` to the model, as Complementarities ``name`` in their order."""
         self.model.add_component(name, Complementarity(range(len(pairs))))
         for i, pair in enumerate(pairs):
-            G, H = (replace_expressions(side, self._copies) for side in pair)
+            G, H = (exchanged(side, self._copies) for side in pair)
             self.model.component(name).add(i, complements(G >= 0, H >= 0))
 
     def set_known(self, equations: ElementEquations) -> None:

@@ -6,6 +6,7 @@ import pytest
 import signum
 from hypothesis import given
 from hypothesis import strategies as st
+from pyomo.core.base.block import BlockData
 from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import FesdError
@@ -216,6 +217,21 @@ def test_derivatives_are_found_in_blocks_and_disjuncts_and_after_discretisation(
     move(m, 2, 1, wrt=m.t)
     assert discretised(m.t)
     assert [d.name for d in derivatives(m, m.t)] == names
+
+
+def test_disjuncts_of_expressions_are_passed_over_and_declared_ones_are_not(m, monkeypatch):
+    m.x = pyo.Var(m.t)
+    m.dx = dae.DerivativeVar(m.x)
+    m.mode = Disjunct(m.i)
+    m.mode['b'].y = pyo.Var(m.t)
+    m.mode['b'].dy = dae.DerivativeVar(m.mode['b'].y)
+    m.choice = Disjunction(m.t, rule=lambda m, t: [[m.x[t] >= 0, m.dx[t] == 1], [m.x[t] <= 0]])
+    searched, walk = [], BlockData.component_objects
+    monkeypatch.setattr(
+        BlockData, 'component_objects', lambda b, *args, **kwds: (searched.append(b.name), walk(b, *args, **kwds))[1]
+    )
+    assert [d.name for d in derivatives(m, m.t)] == ['dx', 'mode[b].dy']
+    assert 'mode[a]' in searched and not any('choice_disjuncts' in name for name in searched)
 
 
 def test_variables_of_another_model_are_refused():

@@ -1,5 +1,6 @@
 """One run of the study, in a child process of ``run.py``: its row."""
 
+import gc
 import logging
 import statistics
 import time
@@ -62,6 +63,8 @@ def _repeated(run, limit):
 
 
 def _timed(run, limit):
+    # what the run before has left is not its work
+    gc.collect()
     begin = time.process_time()
     found = _answer(run, limit)
     return found, time.process_time() - begin

@@ -77,11 +77,12 @@ def active_constraints(disjunct) -> list:
     """Return the active constraints of a disjunct and of the Blocks in it."""
     found = []
     for component in disjunct.component_map().values():
-        if component.ctype is Block or (component.ctype is Constraint and component.is_indexed()):
+        ctype = component.ctype
+        if ctype is Block:
             return list(disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
-        if component.ctype is Constraint and component.active and len(component):
-            found.append(component)
-    # most disjuncts hold a few scalar Constraints, and there is one at every time: Pyomo's walk takes longer than all the rest
+        if ctype is Constraint and component.active:
+            found += [data for data in component.values() if data.active]
+    # most disjuncts hold a few Constraints, and there is one at every time: Pyomo's walk takes longer than all the rest
     return found
 
 

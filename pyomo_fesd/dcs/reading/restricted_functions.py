@@ -2,7 +2,7 @@
 
 from pyomo.common.collections import ComponentSet
 from pyomo.core.expr import numeric_expr as nodes
-from pyomo.core.expr.visitor import StreamBasedExpressionVisitor, identify_variables
+from pyomo.core.expr.visitor import identify_variables
 
 #: Domains of functions as sides (s, o): s e + o >= 0 for the argument e.
 SIDES = {
@@ -46,17 +46,19 @@ def factors_of(expression) -> list:
 
 def arguments_of(expression) -> list:
     """Return ``(node, kind, argument)`` of every restricted function whose argument has variables, in a fixed order."""
-    found = []
-    if not hasattr(expression, 'is_expression_type'):
-        return found
+    found = ((node, restricted(node)) for node in _operations(expression))
+    return [(node, *known) for node, known in found if known is not None and has_variables(known[1])]
 
-    def leave(node, data):
-        known = restricted(node) if hasattr(node, 'is_expression_type') and node.is_expression_type() else None
-        if known is not None and has_variables(known[1]):
-            found.append((node, *known))
 
-    StreamBasedExpressionVisitor(exitNode=leave).walk_expression(expression)
-    return found
+def _operations(expression):
+    """The operations of an expression, each after its arguments, in less time than a visitor of Pyomo takes."""
+    found, waiting = [], [expression]
+    while waiting:
+        node = waiting.pop()
+        if hasattr(node, 'is_expression_type') and node.is_expression_type():
+            found.append(node)
+            waiting.extend(node.args)
+    return found[::-1]
 
 
 def has_variables(expression) -> bool:

@@ -87,6 +87,7 @@ class _Assembly:
         self._p = parameter_values(self._parameters)
         size = sum(functions.size for functions in (rows.cost, rows.rows, rows.sides, rows.others))
         self._kind = ca.SX if expanded or size <= LARGE else ca.MX
+        self._slopes = {}
 
     def by_user(self):
         """The user's factors of variables, rows and objective."""
@@ -105,7 +106,7 @@ class _Assembly:
         alike = [group for group in alike if group]
         s_x = variable_factors(J, (certain, constants), self._start, stated_bounds(self._variables), user.x, alike)
         points = (self._start, beside(self._start))
-        jacobians = [csr(self._rows.rows.jacobian(self._at(w))) @ sparse.diags(1 / s_x) for w in points]
+        jacobians = [self._jacobian(self._rows.rows, w) @ sparse.diags(1 / s_x) for w in points]
         return replace(user, x=s_x, g=row_factors(jacobians, user.g))
 
     def _linearised(self, w):
@@ -115,13 +116,20 @@ class _Assembly:
         """
         at, both, sides = self._at(w), (self._rows.rows, self._rows.sides), 2 * self._q
         count = len(self._constraints) + sides
-        J = sparse.vstack([csr(functions.jacobian(at)) for functions in both]).tocsr()[:count]
+        J = sparse.vstack([self._jacobian(functions, w) for functions in both]).tocsr()[:count]
         parts = [(_column(functions.values(at)), functions.parameter_terms(at)) for functions in both]
         values, terms = (np.concatenate(some)[:count] for some in zip(*parts))
         found, bounds = values - J @ w, np.concatenate([self._rows.lbg, np.zeros(sides)])
         constants = np.abs(found - np.where(np.isfinite(bounds), bounds, 0.0))
         exact = constants > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
         return J, np.maximum(np.where(exact, constants, 0.0), np.maximum(self._rows.cancelling, terms))
+
+    def _jacobian(self, functions, w):
+        """Jacobian (csr) of ``functions`` at ``w``, found once: nobody may change it."""
+        key = id(functions), w.tobytes()
+        if key not in self._slopes:
+            self._slopes[key] = csr(functions.jacobian(self._at(w)))
+        return self._slopes[key]
 
     def _at(self, w):
         return ca.DM(np.concatenate([w, self._p]).tolist())
@@ -164,7 +172,7 @@ class _Assembly:
         """The largest entry of the gradient of each function at the start; 0 where it has none."""
         if not len(functions.constants):
             return np.zeros(0)
-        J = csr(functions.jacobian(self._at(self._start)))
+        J = self._jacobian(functions, self._start)
         largest = largest_entries(with_entries(J, J.data / s_x[J.indices]))
         return np.where(np.isfinite(largest), largest, 0.0)
 

@@ -10,6 +10,7 @@ with L = lam_f C + lam_T T.  Of a short model, casadi derives each NLP as a whol
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 
@@ -90,17 +91,18 @@ class ModelDerivatives:
     """
 
     def __init__(self, functions, n, parameters, m, inner):
-        kind, c = functions.kind, functions
-        w, p, of_cost, of_g, of_z = (
-            kind.sym(name, size) for name, size in (('w', n), ('p', parameters), ('of_cost', 2), ('of_g', m), ('of_z', inner))
-        )
-        cost, z = c.cost.values(w, p), c.sides.values(w, p)
-        self._values = ca.Function('values', [w, p], [cost, c.rows.values(w, p), z])
-        slopes = [rows.jacobian(w, p) for rows in (c.cost, c.rows, c.sides)]
-        self._slopes = ca.Function('slopes', [w, p], slopes)
-        parts = (c.cost, of_cost), (c.rows, of_g), (c.sides, of_z)
-        curvatures = [rows.hessian(w, p, factors) for rows, factors in parts]
-        self._hessian = ca.Function('hessian', [w, p, of_cost, of_g, of_z], [sum(curvatures[1:], curvatures[0])])
+        sizes = ('w', n), ('p', parameters), ('of_cost', 2), ('of_g', m), ('of_z', inner)
+        self._parts, self._symbols = (functions.cost, functions.rows, functions.sides), [functions.kind.sym(*one) for one in sizes]
+        at = self._symbols[:2]
+        self._values = ca.Function('values', at, [rows.values(*at) for rows in self._parts])
+        self._slopes = ca.Function('slopes', at, [rows.jacobian(*at) for rows in self._parts])
+
+    @cached_property
+    def _hessian(self):
+        # a certificate needs none
+        w, p, *factors = self._symbols
+        curvatures = [rows.hessian(w, p, some) for rows, some in zip(self._parts, factors)]
+        return ca.Function('hessian', self._symbols, [sum(curvatures[1:], curvatures[0])])
 
     def values(self, w, p) -> list:
         """Return (f, penalty), g and (G, H, equal) at expressions."""

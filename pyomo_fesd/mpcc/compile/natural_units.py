@@ -67,6 +67,8 @@ def natural_units(c, sized: bool) -> NaturalUnits:
     sized : bool
         whether variables and rows have their factors already, so that only the objective gets one
     """
+    if sized and not _scales_objective(c):
+        return NaturalUnits(np.ones(len(c.x0)), np.ones(len(c.lbg)), 1.0, 0.0)
     typical = np.ones(len(c.x0)) if sized else np.where(c.scale.x == 1.0, _sizes(c), 1.0)
     sizes = np.where((typical < ORDINARY[0]) | (typical > ORDINARY[1]), _power(typical), 1.0)
     points = _samples(c, typical)
@@ -77,9 +79,14 @@ def natural_units(c, sized: bool) -> NaturalUnits:
     return NaturalUnits(1.0 / sizes, factors, *_objective(c, points, gradients, typical))
 
 
+def _scales_objective(c):
+    """Whether there is an objective without a factor of the user."""
+    return c.has_objective and c.scale.f == 1.0
+
+
 def _objective(c, points, gradients, sizes):
     """Factor and offset of the objective."""
-    if not c.has_objective or c.scale.f != 1.0:
+    if not _scales_objective(c):
         return 1.0, 0.0
     values = np.array([c.evaluate(w).f for w in points])
     reach = float(np.max([np.nan_to_num(np.abs(grad), nan=0.0, posinf=0.0) * sizes for grad, *_ in gradients], initial=0.0))

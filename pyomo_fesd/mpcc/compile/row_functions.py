@@ -63,6 +63,8 @@ class RowFunctions:
 
     def parameter_terms(self, x) -> np.ndarray:
         """Sizes of the terms of the parameters in each row at ``x`` (DM)."""
+        if self.linear.shape[1] == self.free:
+            return np.zeros(len(self.constants))
         J = csr(self.jacobian_by_parameters(x))
         return np.nan_to_num(abs(J) @ np.abs(x[self.free :].full().ravel()), posinf=0.0)
 

@@ -5,7 +5,7 @@ import io
 import os
 from abc import abstractmethod
 from dataclasses import replace
-from functools import cache
+from functools import cache, cached_property
 
 import casadi as ca
 import numpy as np
@@ -95,11 +95,8 @@ class _CasadiNlp(NlpSolver):
         self._watch = _StopCallback(x.numel(), g.numel(), p.numel(), deadline or Deadline())
         # casadi's warnings would go to the stderr of the whole process
         settings = {'print_time': False, 'show_eval_warnings': False, 'iteration_callback': self._watch}
-        if self.TAKES_DERIVATIVES:
-            settings |= WITHOUT_PARAMETERS | _functions(x, p, f, g, derivatives or automatic(x, f, g))
-        self._make = lambda ours: ca.nlpsol(name, self.PLUGIN, {'x': x, 'p': p, 'f': f, 'g': g}, settings | {self.PLUGIN: ours})
-        self._options, self._made = (budget, options), {}
-        self._problem = [x, p], [f]
+        self._own, self._options, self._made = settings, (budget, options), {}
+        self._name, self._problem, self._derivatives = name, {'x': x, 'p': p, 'f': f, 'g': g}, derivatives
 
     @abstractmethod
     def _settings(self, budget, options, warm=False):
@@ -121,10 +118,19 @@ class _CasadiNlp(NlpSolver):
                 return f'{messages.getvalue()} {str(error).splitlines()[-1]}'
         return "invalid value" if self._status(solver.stats()) in REFUSED else None
 
+    @cached_property
+    def _given(self):
+        """casadi's options without those of the solver itself."""
+        if not self.TAKES_DERIVATIVES:
+            return self._own
+        x, p, f, g = self._problem.values()
+        return self._own | WITHOUT_PARAMETERS | _functions(x, p, f, g, self._derivatives or automatic(x, f, g))
+
     def _solver_for(self, warm):
         """The solver for a start without or with multipliers, made when it is first needed."""
         if warm not in self._made:
-            self._made[warm] = self._make(self._settings(*self._options, warm))
+            settings = self._given | {self.PLUGIN: self._settings(*self._options, warm)}
+            self._made[warm] = ca.nlpsol(self._name, self.PLUGIN, self._problem, settings)
         return self._made[warm]
 
     def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
@@ -148,7 +154,7 @@ class _CasadiNlp(NlpSolver):
     def _failed(self, w0, p, m, status='error'):
         """The result if the solver returns no point."""
         w = np.array(w0, dtype=float)
-        f = ca.Function('f', *self._problem)(w, p)
+        f = ca.Function('f', [self._problem['x'], self._problem['p']], [self._problem['f']])(w, p)
         return NlpResult(w, float(f), status, 0, np.zeros(m), np.zeros(len(w)))
 
 

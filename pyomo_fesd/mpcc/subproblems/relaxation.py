@@ -81,6 +81,8 @@ def elastic(G, H, eps):
 
 #: A relaxation only leads to a branch, so its stationarity may be coarse; but its pairs must be accurate to eps.
 LEADING = {'constr_viol_tol': 1e-8}
+#: A relaxation without a minimum is given up where a variable is this many times as large as any at the start, and as 1.
+DIVERGES = 1e12
 #: The slack starts at 1, or just above the largest product at the start if that is less.
 ROOM = 1e-2
 
@@ -99,7 +101,8 @@ class Relaxation:
         self._lbg = np.concatenate([c.lbg, np.zeros(signs), np.full(count, 0.0 if terms.equal else -np.inf)])
         self._ubg = np.concatenate([c.ubg, np.full(signs, np.inf), np.zeros(count)])
         nlp = composed(c, Outer(z, slack, eps, ca.SX(terms.cost), ca.vertcat(take(z, sides.chosen), terms.rows)))
-        self._nlp = make(form.__name__, nlp.x, nlp.p, nlp.f, nlp.g, LEADING, nlp.derivatives)
+        limit = {'diverging_iterates_tol': DIVERGES * max(1.0, np.abs(c.x0).max(initial=0.0))}
+        self._nlp = make(form.__name__, nlp.x, nlp.p, nlp.f, nlp.g, LEADING | limit, nlp.derivatives)
 
     def solve(self, w, eps, duals=None, max_iter=None):
         """Solve from ``w``, with the multipliers of an earlier result of this form if given."""

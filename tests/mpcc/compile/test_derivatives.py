@@ -93,6 +93,12 @@ def by_the_chain_rule():
         yield
 
 
+def test_gradients_alone_make_no_hessian():
+    c = PROBLEMS['exponential side']()
+    c.gradients(c.x0)
+    assert 'derivatives' in vars(c) and '_hessian' not in vars(c.derivatives)
+
+
 @pytest.fixture(params=PROBLEMS)
 def c(request):
     return PROBLEMS[request.param]()

@@ -7,6 +7,7 @@ from pyomo.common.timing import HierarchicalTimer
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.mpcc.compile.compile import compile_mpcc
+from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc
 
 TINY = 1e-10
@@ -46,3 +47,12 @@ def test_a_large_value_shows_a_large_size():
 
 def test_the_constant_of_a_side_shows_no_small_size():
     assert np.all(scales(side=lambda m: m.x[0] + m.y[1] + TINY >= 0) == 1.0)
+
+
+def test_without_an_objective_a_model_sized_by_starts_is_not_evaluated():
+    m = pyo.ConcreteModel()
+    m.x = pyo.Var(initialize=1e8)
+    m.row = pyo.Constraint(expr=m.x**2 == 4e16)
+    c = compile_mpcc(read_mpcc(m), HierarchicalTimer(), natural_units='starts')
+    assert c.scale.x[0] < 1e-6
+    assert '_jacobian' not in vars(c) and natural_units(c, True).ordinary and '_jacobian' not in vars(c)

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from problems import mpcc_collection, small_mpccs
+from pyomo.contrib.solver.common.factory import SolverFactory
 
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS, elastic, fischer_burmeister, l1, scholtes_equality
 
@@ -77,3 +78,13 @@ def test_infeasible(build, relaxation):
 def test_unbounded(build, relaxation):
     results = pyo.SolverFactory('mpec_hybrid').solve(build(), relaxation=relaxation)
     assert results.solver.termination_condition == pyo.TerminationCondition.unbounded
+
+
+def test_a_relaxation_without_a_minimum_is_given_up_early():
+    # along x = y the elastic form of eps = 1 falls without bound
+    model = small_mpccs.pair(1.0, 1.0)
+    model.f = pyo.Objective(expr=model.x**2 + model.y**2 - 4 * model.x * model.y)
+    results = SolverFactory('mpec_hybrid').solve(model)
+    first = results.extra_info.steps[0]
+    assert first.kind == 'relaxation' and first.iterations < 200
+    assert results.extra_info.stationarity == 'B' and pyo.value(model.f) == pytest.approx(0, abs=1e-8)
