@@ -43,6 +43,26 @@ class Entered:
 
 
 @dataclass(frozen=True)
+class ChangedEnd:
+    """The place at an end in which a change has come in, nothing else moved.
+
+    Attributes
+    ----------
+    extent, inner : int
+        those of the place and of the one beside it
+    zero : int array (q)
+    targets, sources : int arrays
+        pairs of the place beside it, and those of the place that mean the same
+    """
+
+    extent: int
+    inner: int
+    zero: np.ndarray
+    targets: np.ndarray
+    sources: np.ndarray
+
+
+@dataclass(frozen=True)
 class _Change:
     """Zero sides that pairs get beyond a change."""
 
@@ -54,8 +74,10 @@ class _Change:
         return _Change(*(np.concatenate(both) for both in zip(vars(self).values(), vars(other).values())))
 
 
-def branches(c, w, sets, tolerance) -> Iterator[Entered | None]:
+def branches(c, w, sets, tolerance) -> Iterator[tuple[Entered | None, ChangedEnd | None]]:
     """Yield the branches of all changes at the ends of the point ``w``, in every order; None for one without a place to spare.
+
+    With each comes the place at the end alone, if one change has come in at an end of all rows.
 
     Parameters
     ----------
@@ -75,7 +97,7 @@ def branches(c, w, sets, tolerance) -> Iterator[Entered | None]:
             by_row.setdefault(id(arrival.rows), (arrival.rows, []))[1].append(changes)
     for rows, present in by_row.values():
         for sequence in _sequences(present):
-            yield _entered(rows, sequence, sets, w)
+            yield _entered(rows, sequence, sets, w), _changed_end(rows, sequence, sets)
 
 
 def _sequences(present) -> Iterator[tuple]:
@@ -146,6 +168,17 @@ def _entered(rows, sequence, sets, w):
     extents = [place.extent for row in rows for place in row[: len(sequence)]]
     between = len(rows) == 2 and len(sequence) == 1
     return None if None in extents else Entered(np.array(extents), zero, start, np.concatenate(either), between)
+
+
+def _changed_end(rows, sequence, sets):
+    """The place at an end with its change; None with more changes than one, at an end between two rows, and without places."""
+    (row, *others), (change, *more) = rows, sequence
+    if others or more or len(row) < 2 or change.either.size or None in (row[0].extent, row[1].extent):
+        return None
+    zero = sets.zero.copy()
+    zero[change.pairs] = change.sides
+    targets, sources = (np.concatenate(both) for both in zip(*((m.targets, m.sources) for m in (row[1].inside, row[1].between))))
+    return ChangedEnd(row[0].extent, row[1].extent, zero, targets, sources)
 
 
 def _moved_inwards(row, zero, start, undecided):

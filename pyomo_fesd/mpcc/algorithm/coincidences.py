@@ -92,6 +92,8 @@ class Coincidences:
         if better is not None:
             return better
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)
+        if self._holds_anything(point.w, sets):
+            return OPEN
         for order in self._orders(point, sets):
             if order.key in tried:
                 continue
@@ -108,15 +110,23 @@ class Coincidences:
         verdicts = [judge() for judge in order.judges]
         if Verdict.IMPOSSIBLE in verdicts or Verdict.NO_DESCENT in verdicts:
             return SETTLED
-        found = self._first(partial(self._try, point), order.ways)
+        inserts = any(verdict is not Verdict.NONE for verdict in verdicts)
+        found = self._first(partial(self._try, point, inserts), order.ways)
         if found is ABSENT:
-            # no branch of this order contains the point, but an inserted place may grow
-            return OPEN if Verdict.DESCENT in verdicts else SETTLED
+            # that no branch contains the point is no proof, as there may be no place to spare; but where nothing can be inserted
+            # there is no other
+            return OPEN if inserts else SETTLED
         return found
 
     def _is_flat(self, point):
         """Whether no direction descends, whatever the constraints."""
         return not self._c.gradients(point.w)[0].any()
+
+    def _holds_anything(self, w, sets):
+        """Whether a place at its least extent has a bi-active pair: it would hold anything, and the LPEC takes its values for rates."""
+        parts = self._subsolves.parts
+        least = [k for k, part in enumerate(parts.all) if w[part.extent] <= self._c.lbx[part.extent] + NEAR_BOUND]
+        return bool(len(least)) and bool(np.isin(parts.of_pair[sets.gamma], least).any())
 
     @staticmethod
     def _first(attempt, ways):
@@ -137,8 +147,9 @@ class Coincidences:
                     yield _Order(_possible(w, (coincidence.earlier, _moved(at.zero, [c.earlier for c in some]))), judges[1:])
                 else:
                     yield _Order(_possible(w, later, (coincidence.earlier, _moved(at.zero, [c.earlier for c in rest]))), judges)
-        for entered in branches(self._c, w, sets, self._tolerances.biactive):
-            yield _Order([], []) if entered is None else _Order([entered], [partial(inserted.entered, entered)])
+        for entered, changed in branches(self._c, w, sets, self._tolerances.biactive):
+            judges = [partial(inserted.entered, entered), partial(inserted.at_end, changed)]
+            yield _Order([] if entered is None else [entered], judges)
 
     def _situations(self, w, sets) -> Iterator[tuple]:
         """Each coincidence with the active sets; also those as if the place beside it, at its lower bound, were none."""
@@ -151,8 +162,11 @@ class Coincidences:
                     zero = _moved(sets.zero, [getattr(change, direction) for change in others[variable].changes])
                     yield coincidence, ActiveSets(zero, np.zeros(len(zero), dtype=bool))
 
-    def _try(self, point, way):
-        """A better point in the branch of a way, in which its places may grow; or the outcome."""
+    def _try(self, point, inserts, way):
+        """A better point in the branch of a way, in which its places may grow; or the outcome.
+
+        ``inserts`` is whether places can be inserted, so that their values have a limit.
+        """
         enough = self._tolerances.descent
         with self._c.vanishing(way.extents):
             start, equal = self._beside(point, way)
@@ -164,6 +178,8 @@ class Coincidences:
             gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
             sets = ActiveSets(self._subsolves.settled(start.w, way.zero), gamma)
             w = self._subsolves.at_limit(start.w, sets.zero, way.extents, point.w[way.extents].max())
+            if w is None and inserts:
+                return OPEN
             w = start.w if w is None else w
             step = self._subsolves.lpec(w, sets, self._tolerances.radius, equal, multipliers=-start.lam_g, enough=enough)
         if not step.solved:

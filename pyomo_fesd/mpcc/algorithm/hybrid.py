@@ -93,25 +93,36 @@ class HybridSolver:
         """The whole algorithm."""
         if self._starts_at_a_solution():
             return Outcome.SOLVED
-        certified = bool(self._options.warm_start) and self._from_values()
-        if not certified and self._options.warm_start == ONLY:
-            return Outcome.NO_BRANCH if self.run.point is None else Outcome.FEASIBLE
-        if not certified:
-            if not self._complete():
-                self._follow_path()
-            if self.run.point is not None and self._c.has_objective:
-                self._branches.try_neighbours()
+        if self._options.warm_start and self._from_values():
+            self._finish()
+        if not self._is_certified():
+            if self._options.warm_start == ONLY:
+                return Outcome.NO_BRANCH if self.run.point is None else Outcome.FEASIBLE
+            self._from_start()
+            self._finish()
+        if self.run.point is None:
+            return Outcome.INFEASIBLE
+        if not self._is_certified():
+            return Outcome.FEASIBLE
+        return Outcome.CERTIFIED if self._c.has_objective else Outcome.SOLVED
+
+    def _is_certified(self):
+        return self.run.point is not None and self.run.point.certificate.certified
+
+    def _from_start(self):
+        """Completions or the homotopy; without a feasible point from there, a search."""
+        if not self._complete():
+            self._follow_path()
+        if self.run.point is not None and self._c.has_objective:
+            self._branches.try_neighbours()
         if self.run.point is None:
             self._search_everywhere()
+
+    def _finish(self):
+        """Descend, and try all orders of changes, before the point counts."""
         self._c.widen()
         self._descend_at_last()
         self._settle()
-        point = self.run.point
-        if point is None:
-            return Outcome.INFEASIBLE
-        if not point.certificate.certified:
-            return Outcome.FEASIBLE
-        return Outcome.CERTIFIED if self._c.has_objective else Outcome.SOLVED
 
     def _descend_at_last(self):
         """Descend from a point that was not worth it on the way, as the homotopy promised better ones that it did not find."""
@@ -209,7 +220,7 @@ class HybridSolver:
         self._subsolves.keep_least_infeasible(self._c.x0)
         if not self._branches.explore_decided(self._c.x0):
             self._branches.explore_from(self._c.x0, False)
-        return self.run.point is not None and self.run.point.certificate.certified
+        return self._is_certified()
 
     def _start_is_better(self):
         """Whether the path led to no certified point, or to one above a start that is feasible."""

@@ -10,7 +10,10 @@ Does not apply: to models without parts.
 
 import numpy as np
 
-from pyomo_fesd.mpcc.subproblems import G_ZERO, Insertion, Verdict
+from pyomo_fesd.mpcc.subproblems import G_ZERO, EndInsertion, Insertion, Verdict
+
+#: Whether a copy lies before the part beside an end between two rows: that on the near side of it, and that on the far side.
+SIDES = False, True
 
 
 class OrdersByInsertion:
@@ -37,26 +40,34 @@ class OrdersByInsertion:
         return self._verdict(coincidence, coincidence.before, some, present, self._earlier)
 
     def entered(self, way) -> Verdict:
-        """The verdict of a change that has come in at an end, by the place beyond it, or those on both sides of an end between two
-        rows: each of them must be possible."""
-        if len(way.extents) != 1 + way.between:
-            return Verdict.UNKNOWN
-        found = (self._at_end(way, extent, beyond) for beyond, extent in enumerate(way.extents))
-        return Verdict.IMPOSSIBLE if Verdict.IMPOSSIBLE in found else Verdict.UNKNOWN
+        """The verdict of a change that has come in on both sides of an end between two rows: both must be possible."""
+        if way is None or not way.between or len(way.extents) != len(SIDES):
+            return Verdict.NONE
+        found = [self._beside_boundary(way, extent, ahead) for extent, ahead in zip(way.extents, SIDES)]
+        return next((verdict for verdict in (Verdict.IMPOSSIBLE, Verdict.UNKNOWN) if verdict in found), Verdict.NONE)
 
-    def _at_end(self, way, extent, beyond):
-        """The verdict of the place at an end, by its values alone; ``beyond`` is 1 for the one after an end between two rows."""
+    def _beside_boundary(self, way, extent, ahead):
+        """The verdict of the place on one side of such an end, by its values alone."""
         k = self._parts.by_extent.get(extent)
         if k is None:
-            return Verdict.UNKNOWN
-        ahead = bool(beyond) or (not way.between and self._parts.previous(k) is None)
+            return Verdict.NONE
         order = Insertion(k, ahead, way.zero, self._sets.zero, (k, *self._parts.beside(k)))
         return self._subsolves.insertion(self._point, self._sets, order, None)
+
+    def at_end(self, changed) -> Verdict:
+        """The verdict of a change that has come in at an end of all rows."""
+        if changed is None:
+            return Verdict.NONE
+        end, inner = (self._parts.by_extent.get(extent) for extent in (changed.extent, changed.inner))
+        if end is None or inner is None or inner not in self._parts.beside(end):
+            return Verdict.NONE
+        order = EndInsertion(end, inner, changed.zero, changed.targets, changed.sources)
+        return self._subsolves.insertion_at_end(self._point, self._sets, order)
 
     def _verdict(self, coincidence, extent, some, present, insertion):
         k = self._parts.by_extent.get(extent)
         if k is None:
-            return Verdict.UNKNOWN
+            return Verdict.NONE
         order, unchanged = (insertion(k, coincidence, moved, present) for moved in (some, ()))
         return self._subsolves.insertion(self._point, self._sets, order, unchanged)
 

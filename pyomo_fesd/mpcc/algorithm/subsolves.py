@@ -13,6 +13,7 @@ from pyomo_fesd.mpcc.nlp import nlp_solver
 from pyomo_fesd.mpcc.subproblems import (
     RELAXATIONS,
     Branch,
+    EndInsertions,
     Insertions,
     Lpec,
     Parts,
@@ -50,7 +51,8 @@ class Subsolves:
         self._sides, self._nlps, self._solver = setup.cache.sides, setup.cache.nlps, nlp_solver(setup.options.nlp_solver)
         self._lpec = Lpec(self._c, self._sides, self._options.lpec_options.value(), setup.deadline)
         self.parts = Parts(self._c)
-        self._insertions = Insertions(self._c, self._sides, self.parts, self._lpec, tolerances)
+        common = self._c, self._sides, self.parts, self._lpec, tolerances
+        self._insertions, self._end_insertions = Insertions(*common), EndInsertions(*common)
 
     # called by the algorithm
 
@@ -100,9 +102,16 @@ class Subsolves:
 
     def insertion(self, point, sets, order, unchanged):
         """The ``Verdict`` of a part that is inserted into a point; ``unchanged`` is one that changes nothing there."""
+        return self._verdict(point, lambda equal: self._insertions.verdict(point.w, sets, equal, order, unchanged))
+
+    def insertion_at_end(self, point, sets, order):
+        """The ``Verdict`` of a part of no extent at an end of a point."""
+        return self._verdict(point, lambda equal: self._end_insertions.verdict(point.w, sets, equal, order))
+
+    def _verdict(self, point, judge):
         equal = self._c.evaluate(point.w).eta > self.tolerances.eta if point.equal is None else point.equal
         with self._timed('lpec') as started:
-            verdict = self._insertions.verdict(point.w, sets, equal, order, unchanged)
+            verdict = judge(equal)
         self._log('order', 0.0, point.w, 0, verdict.value, started)
         return verdict
 

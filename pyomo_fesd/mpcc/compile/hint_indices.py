@@ -74,6 +74,8 @@ class PartIndices:
     ----------
     extent : int
     own, gate : int arrays
+    places : int array
+        of all own variables, in the same order for all parts of a chain; -1 where one is given
     first, last : int arrays
         the same quantities at its beginning and at its end
     ends : int array
@@ -88,6 +90,7 @@ class PartIndices:
     extent: int
     own: np.ndarray
     gate: np.ndarray
+    places: np.ndarray
     first: np.ndarray
     last: np.ndarray
     ends: np.ndarray

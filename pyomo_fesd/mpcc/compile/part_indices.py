@@ -4,8 +4,13 @@ Takes: chains of ``Part``, and the positions of variables by the id of a compone
 Leaves: the same by positions.
 """
 
+import numpy as np
+
 from pyomo_fesd.mpcc.compile.arrival_indices import both_positions, positions_of
 from pyomo_fesd.mpcc.compile.hint_indices import PartIndices
+
+#: In place of the position of a variable that is given.
+NONE = -1
 
 
 def part_indices(chains, columns) -> list[PartIndices]:
@@ -20,6 +25,7 @@ def _part(part, columns, chain, number):
         columns[id(part.extent)][0],
         positions_of(part.own, columns),
         positions_of(part.gate, columns),
+        np.array([columns[id(v)][0] if id(v) in columns else NONE for v in part.own], dtype=int),
         *both_positions(part.ends, columns),
         positions_of([last for _, last in part.ends], columns),
         chain,

@@ -26,6 +26,8 @@ CONTRADICTION, SEED = 1e-3, 0
 EXACT = 1e-9
 #: Singular values below this, relative to the largest one, are zero: extents enter with their square.
 SINGULAR = 1e-13
+#: A direction with more of a variable in it, that changes no equation, leaves the variable undetermined.
+UNDETERMINED = 1e-6
 #: Part of the condition number that belongs to this, up to which an estimate shows that no singular value is zero.
 CLEARLY = 1e-2
 
@@ -44,6 +46,11 @@ class InsertedPart:
         stacked numbers of the rows among which the equations are
     zero : int array (q)
         zero sides of all pairs; only those among the rows count
+
+    Attributes
+    ----------
+    determined : bool
+        whether the equations determined all values when they were solved last
     """
 
     def __init__(self, c, sides, parts, columns, rows, zero):
@@ -53,10 +60,13 @@ class InsertedPart:
         self._zero_rows[self._m : self._m + 2 * self._q] = sides.zero_rows(zero)
         self._low = np.concatenate([c.lbg, np.zeros(2 * self._q), np.full(c.equal.numel(), -np.inf)])
         self._high = np.concatenate([c.ubg, np.full(2 * self._q + c.equal.numel(), np.inf)])
-        self._columns = columns
+        self._columns, self.determined = columns, True
 
-    def solve(self, w):
-        """``w`` with the values that the equations determine; None if they are not determined, or not found."""
+    def solve(self, w, any_of=False):
+        """``w`` with the values that the equations determine; None if they are not determined, or not found.
+
+        With ``any_of`` values need not be determined: those beside the given ones are taken.
+        """
         rows, fixed, at = self._equations(w)
         w = w.copy()
         w[fixed] = at
@@ -70,21 +80,75 @@ class InsertedPart:
             w[free] += step
             if np.abs(step).max(initial=0.0) <= LAST_STEP * max(1.0, np.abs(w[free]).max(initial=0.0)):
                 left = np.abs((self._values(w) - self._low)[rows] / scale).max(initial=0.0)
-                return w if determined and left <= RESIDUAL else None
+                self.determined = determined
+                return w if (determined or any_of) and left <= RESIDUAL else None
         return None
 
     def contradict(self, w) -> bool:
         """Whether no values within their bounds satisfy the equations that are linear in the variables to determine."""
+        A, residual, free, _ = self._linear(w)
+        return _least_violation(A, residual, self._c.lbx[free] - w[free], self._c.ubx[free] - w[free]) > CONTRADICTION
+
+    def contradiction(self, w, others):
+        """What is left of a sum of these linear equations in which the variables to determine cancel, and its gradient.
+
+        The sum has factors of length 1; the variables ``others`` cancel too.  None where the equations have a solution.
+        """
+        A, residual, _, J = self._linear(w)
+        A = np.hstack([A, J[:, others].toarray()])
+        left = residual - A @ np.linalg.lstsq(A, residual, rcond=SINGULAR)[0]
+        size = np.linalg.norm(left)
+        if size <= RESIDUAL * max(1.0, np.abs(residual).max(initial=0.0)):
+            return None
+        gradient = J.T @ (left / size)
+        gradient[self._columns] = gradient[others] = 0.0
+        return size, gradient
+
+    def _linear(self, w):
+        """Equations that are linear in the variables to determine: A, residual, these variables, and the whole Jacobian."""
         rows, fixed, at = self._equations(w)
         w = w.copy()
         w[fixed] = at
         free, other = np.setdiff1d(self._columns, fixed), w.copy()
         other[free] += np.random.default_rng(SEED).uniform(0.1, 1.0, len(free))
-        A, B = (self._c.stacked_jacobian(at)[rows][:, free].toarray() for at in (w, other))
-        linear = np.abs(A - B).max(axis=1, initial=0.0) <= EXACT
+        J, there = (self._c.stacked_jacobian(at)[rows] for at in (w, other))
+        A = J[:, free].toarray()
+        linear = np.abs(A - there[:, free].toarray()).max(axis=1, initial=0.0) <= EXACT
+        terms = np.maximum(1.0, abs(J) @ np.abs(w))[linear]
+        residual = (self._values(w) - self._low)[rows][linear] / terms
+        return A[linear] / terms[:, None], residual, free, sparse.diags(1 / terms) @ J[linear]
+
+    def nearest(self, w):
+        """``w`` with the values to determine where the equations hold best (Gauss-Newton), whatever else is in them."""
+        rows, fixed, at = self._equations(w)
+        w = w.copy()
+        w[fixed] = at
+        free = np.setdiff1d(self._columns, fixed)
+        for _ in range(STEPS):
+            J, residual = self._c.stacked_jacobian(w)[rows], (self._values(w) - self._low)[rows]
+            scale = _largest(J)
+            A = (sparse.diags(1 / scale) @ J)[:, free].toarray()
+            step = np.linalg.lstsq(A, -residual / scale, rcond=None)[0]
+            w[free] += step
+            if np.abs(step).max(initial=0.0) <= LAST_STEP * max(1.0, np.abs(w[free]).max(initial=0.0)):
+                break
+        return w
+
+    def missed(self, w) -> float:
+        """By how much ``w`` misses a row of the part, relative to its terms, at most."""
+        rows, values = self._rows, self._values(w)
+        high = np.where(self._zero_rows, 0.0, self._high)
         terms = np.maximum(1.0, abs(self._c.stacked_jacobian(w)[rows]) @ np.abs(w))
-        A, residual = A[linear] / terms[linear, None], ((self._values(w) - self._low)[rows] / terms)[linear]
-        return _least_violation(A, residual, self._c.lbx[free] - w[free], self._c.ubx[free] - w[free]) > CONTRADICTION
+        return float((np.maximum(self._low - values, values - high)[rows] / terms).max(initial=0.0))
+
+    def determine(self, w, row) -> bool:
+        """Whether the equations determine the value of a row."""
+        J = self._c.stacked_jacobian(w)
+        rows, fixed, _ = self._equations(w)
+        free = np.setdiff1d(self._columns, fixed)
+        gradient, basis = J[row].toarray().ravel()[free], (sparse.diags(1 / _largest(J[rows])) @ J[rows])[:, free].toarray().T
+        left = gradient - basis @ np.linalg.lstsq(basis, gradient, rcond=SINGULAR)[0]
+        return bool(np.abs(left).max(initial=0.0) <= UNDETERMINED * max(1.0, np.abs(gradient).max(initial=0.0)))
 
     def slopes(self, w, row):
         """Derivatives of a row where the equations hold, by all variables that they do not determine."""
@@ -173,7 +237,7 @@ class InsertedPart:
             below = gates & inner & (w[free] + step < low - EXACT)
             if not below.any():
                 undetermined = np.abs(Vt[rank:]).max(axis=0, initial=0.0)
-                return step, not np.any(undetermined[~gates[inner]] > 1e-6)
+                return step, not np.any(undetermined[~gates[inner]] > UNDETERMINED)
             at_bound |= below
         return step, False
 

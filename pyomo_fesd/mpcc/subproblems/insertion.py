@@ -9,56 +9,19 @@ possible beside the point; if they are, the LPEC with the copy shows whether h m
 
 Takes: a point, and zero sides of the copy and of the part after it.
 Leaves: a ``Verdict``.
-Does not apply: where the values of the copy are not determined, or have no limit; beside parts of nearly no extent; with fillings.
-"""
+Does not apply: where the values of the copy have no limit; beside parts of nearly no extent; with fillings.
 
-from dataclasses import dataclass, replace
-from enum import Enum
+Values that the equations do not determine, as controls that vary within parts, are those of the part before or after the copy, and
+both must give the same verdict: stationarity is a local notion for them too.
+"""
 
 import numpy as np
 
-from pyomo_fesd.mpcc.subproblems.active_set import FREE, ActiveSets
-from pyomo_fesd.mpcc.subproblems.descent import Descent
-from pyomo_fesd.mpcc.subproblems.inserted_copy import Copy
+from pyomo_fesd.mpcc.subproblems.active_set import ActiveSets
+from pyomo_fesd.mpcc.subproblems.inserted_copy import Copy, Insertion
 from pyomo_fesd.mpcc.subproblems.inserted_part import InsertedPart
-from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec
-
-#: Parts that are shorter than this, relative to the longest one beside them, have nearly no extent.
-SHORT = 0.01
-
-
-class Verdict(Enum):
-    """What an inserted part shows."""
-
-    IMPOSSIBLE = 'its sides are not possible beside the point'
-    NO_DESCENT = 'it cannot grow with descent'
-    DESCENT = 'it may grow with descent'
-    UNKNOWN = 'not decided'
-
-
-@dataclass(frozen=True)
-class Insertion:
-    """A copy of a part, and where it is inserted.
-
-    Attributes
-    ----------
-    k : int
-        the part that is copied
-    ahead : bool
-        whether the copy lies before part k, or after it
-    zero : int array (q)
-        zero sides, of which those of part k are the copy's
-    zero_beside : int array (q)
-        zero sides of all others
-    guesses : tuple of int
-        parts whose values to start from
-    """
-
-    k: int
-    ahead: bool
-    zero: np.ndarray
-    zero_beside: np.ndarray
-    guesses: tuple
+from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec, linearised_at_both
+from pyomo_fesd.mpcc.subproblems.verdict import Verdict, of_all, of_lpec
 
 
 class Insertions:
@@ -85,20 +48,28 @@ class Insertions:
             at the same place, with the sides that are there already: a descent that it has too is one of uneven extents.  None:
             whether the copy may grow is not looked at
         """
-        part = self._parts.all[insertion.k]
+        part, found = self._parts.all[insertion.k], []
+        if not self._parts.may_be_copied(insertion.k):
+            return Verdict.NONE
         if not self._applies(w, insertion, grows=present is not None):
             return Verdict.UNKNOWN
         with self._c.vanishing(np.array([part.extent])):
-            copy = Copy(self._c, self._sides, self._parts, insertion)
-            verdict = self._by_values(w, insertion, copy)
-            if verdict is not None or present is None:
-                return verdict or Verdict.UNKNOWN
-            found = self._by_lpec(w, sets, equal, insertion, copy, 0.0)
-            if found is not None and found.descent > self._tolerances.descent:
-                found = self._by_lpec(w, sets, equal, insertion, copy, self._credit(w, sets, equal, present))
-        if found is None or not found.solved:
-            return Verdict.UNKNOWN
-        return Verdict.DESCENT if found.descent > self._tolerances.descent else Verdict.NO_DESCENT
+            for guess in insertion.guesses:
+                copy = Copy(self._c, self._sides, self._parts, insertion)
+                found.append(self._of_copy(w, sets, equal, insertion, copy, guess, present))
+                if copy.determined and found[-1] is not Verdict.UNKNOWN:
+                    return found[-1]
+        return of_all(found)
+
+    def _of_copy(self, w, sets, equal, insertion, copy, guess, present):
+        """The verdict by a copy that starts from the values of one part."""
+        verdict = self._by_values(w, insertion, copy, guess)
+        if verdict is not None or present is None:
+            return verdict or Verdict.UNKNOWN
+        found = self._by_lpec(w, sets, equal, insertion, copy, 0.0)
+        if found is not None and found.descent > self._tolerances.descent:
+            found = self._by_lpec(w, sets, equal, insertion, copy, self._credit(w, sets, equal, present))
+        return of_lpec(found, self._tolerances.descent)
 
     def at_limit(self, w, zero, extents, size):
         """``w`` with the values that parts of extent 0 have as they grow, which their equations may not determine at 0.
@@ -127,22 +98,17 @@ class Insertions:
     def _applies(self, w, insertion, grows):
         part = self._parts.all[insertion.k]
         # the copy of a part whose first values are given begins with them
-        possible = part.copies and (part.whole or (insertion.ahead and not grows))
-        # where amounts lie in fillings depends on all extents before them
-        possible = possible and not (grows and self._following(insertion) is None) and not self._c.fillings
-        return possible and not self._is_beside_a_short_part(w, insertion.k)
+        possible = (part.whole or (insertion.ahead and not grows)) and not (grows and self._following(insertion) is None)
+        return possible and not self._parts.is_beside_a_short_one(w, insertion.k)
 
     @staticmethod
-    def _by_values(w, insertion, copy):
+    def _by_values(w, insertion, copy, guess):
         """The verdict that the values of the copy give; None if its sides are possible."""
-        if not copy.solve(w, insertion.guesses):
-            return Verdict.IMPOSSIBLE if copy.contradicts_itself(w, insertion.guesses) else Verdict.UNKNOWN
-        return Verdict.IMPOSSIBLE if copy.impossible(w) else None
-
-    def _is_beside_a_short_part(self, w, k):
-        """Whether part ``k`` or one beside it has nearly no extent: what it holds need not be what follows or precedes."""
-        beside = [w[self._parts.all[j].extent] for j in (k - 1, k, k + 1) if 0 <= j < len(self._parts.all)]
-        return min(beside) < SHORT * max(beside)
+        if copy.solve(w, (guess,)):
+            if copy.impossible(w):
+                return Verdict.IMPOSSIBLE
+            return Verdict.UNKNOWN if copy.misses() else None
+        return Verdict.IMPOSSIBLE if copy.contradicts_itself(w, insertion.guesses) else Verdict.UNKNOWN
 
     def _credit(self, w, sets, equal, present):
         """The descent, for each unit of its extent, of a copy that changes nothing: the error of the method."""
@@ -187,20 +153,11 @@ class Insertions:
         beside = self._beside(w, sets.zero, insertion, copy)
         if beside is None:
             return None
-        sets = ActiveSets(insertion.zero_beside, sets.gamma & (insertion.zero_beside == sets.zero))
-        (sets, equal, base), (others, _, there) = (
-            self._lpec.linearised(at, sets, self._tolerances.radius, equal, beyond=True) for at in (w, beside)
-        )
-        if not (sets.same_sides(others) and np.array_equal(sets.gamma, others.gamma)):
+        sets, radius = ActiveSets(insertion.zero_beside, sets.gamma & (insertion.zero_beside == sets.zero)), self._tolerances.radius
+        both = linearised_at_both(self._lpec, w, beside, sets, radius, equal)
+        if both is None:
             return None
+        sets, equal, base, there = both
         joined = JoinedLpec(self._c, self._sides, self._parts, insertion, following, sets, equal)
-        unfixed = replace(sets, zero=np.where(self._parts.of_pair == following, FREE, sets.zero))
-        base = joined.with_following(base, there)
-        base = replace(base, program=joined.unfixed(base.program, *self._lpec.box(w, unfixed, base.program.reach, beyond=True)))
-        limits = copy.limits(self._tolerances.radius, joined.fixed_by_following)
-        points = w, beside, copy.limit
-        at = joined.linearised(
-            base, [(self._c.gradients(at)[0], self._c.stacked_jacobian(at)) for at in points], credit, limits, copy.fixed
-        )
-        descent = Descent(at.program, lambda: [(cost, A.T.dot) for cost, A in joined.changes(*map(self._lpec.changes, points))])
-        return self._lpec.best(sets, at, descent, True)
+        base, limits = joined.with_following(base, there), copy.limits(radius, joined.fixed_by_following)
+        return joined.best(self._lpec, sets, base, (w, beside, copy.limit), credit, limits, copy.fixed)

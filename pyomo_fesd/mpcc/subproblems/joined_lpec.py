@@ -13,6 +13,8 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 
+from pyomo_fesd.mpcc.subproblems.active_set import FREE
+from pyomo_fesd.mpcc.subproblems.descent import Descent
 from pyomo_fesd.mpcc.subproblems.linear_program import Program
 from pyomo_fesd.mpcc.subproblems.lpec import Linearised, row_places
 from pyomo_fesd.mpcc.subproblems.parts import SHARED
@@ -22,31 +24,49 @@ class JoinedLpec:
     """Joins the model and the copy of one insertion; ``following`` is the part after the copy."""
 
     def __init__(self, c, sides, parts, insertion, following, sets, equal):
-        part, n = parts.all[insertion.k], len(c.x0)
+        self._c, part, n = c, parts.all[insertion.k], len(c.x0)
         self.rows, self.own = np.flatnonzero(parts.of_row == insertion.k), part.own
         self._n, self._extent = n, part.extent
         self._program_rows = np.concatenate(row_places(sets, equal, len(c.lbg)))
         self._last = 2 * int(sets.gamma.sum())
         place = {j: n + i for i, j in enumerate(part.own)}
-        after = parts.all[following]
-        passed_on = dict(zip(part.first, part.last)) if insertion.ahead else {j: j for j in after.first}
-        self._of_following = {j: place[passed_on[j]] for j in after.first if passed_on[j] in place}
+        passed_on = dict(zip(part.first, part.last)) if insertion.ahead else {j: j for j in part.last}
+        self._of_following = {j: place[last] for j, last in passed_on.items() if last in place}
         self._of_copy = place | ({} if insertion.ahead else dict(zip(part.first, part.last)))
         still = sides.fixed_by(sets.zero, parts.of_pair == following)
         self.fixed_by_following = [passed_on[j] for j in still if j in self._of_following]
         self._follows = parts.of_row[self._program_rows] == following
-        self._of_part = parts.of_variable == following
         self._shares = parts.of_row[self._program_rows] == SHARED
+        self._parts, self._following = parts, following
 
     def with_following(self, base, other):
         """The LPEC with the rows and variables of the part after the copy linearised at another point."""
+        return self._with_part(base, other, self._following)
+
+    def _with_part(self, base, other, k):
+        """The LPEC with the rows and variables of part ``k`` linearised at another point."""
         p, q = base.program, other.program
-        low, high = (np.where(self._follows, new, old) for old, new in ((p.low, q.low), (p.high, q.high)))
-        lower, upper = (np.where(self._of_part, new, old) for old, new in ((p.lower, q.lower), (p.upper, q.upper)))
+        of_rows, of_variables = self._parts.of_row[self._program_rows] == k, self._parts.of_variable == k
+        low, high = (np.where(of_rows, new, old) for old, new in ((p.low, q.low), (p.high, q.high)))
+        lower, upper = (np.where(of_variables, new, old) for old, new in ((p.lower, q.lower), (p.upper, q.upper)))
         half = self._last // 2
-        G, H = (self._follows[len(self._follows) - self._last :][part] for part in (slice(half), slice(half, None)))
+        G, H = (of_rows[len(of_rows) - self._last :][side] for side in (slice(half), slice(half, None)))
         program = replace(p, low=low, high=high, lower=lower, upper=upper)
         return replace(base, program=program, G=np.where(G, other.G, base.G), H=np.where(H, other.H, base.H))
+
+    def gradients(self, points):
+        """Gradient of the objective and Jacobian of all rows at each point."""
+        return [(self._c.gradients(at)[0], self._c.stacked_jacobian(at)) for at in points]
+
+    def best(self, lpec, sets, base, points, credit, limits, fixed):
+        """The best direction of the LPEC with the copy, which grows at ``credit`` more for each unit.
+
+        The first of the ``points`` is the one without a copy; the variables ``fixed`` of the copy do not move.
+        """
+        base = replace(base, program=self._unfixed(lpec, points[0], sets, base.program))
+        at = self.linearised(base, self.gradients(points), credit, limits, fixed)
+        descent = Descent(at.program, lambda: [(cost, A.T.dot) for cost, A in self.changes(*map(lpec.changes, points))])
+        return lpec.best(sets, at, descent, True)
 
     def linearised(self, base, points, credit, limits, fixed):
         """The LPEC with the copy, without its binaries."""
@@ -64,9 +84,11 @@ class JoinedLpec:
         half = A.shape[0] - y // 2
         return Linearised(program, base.equal, base.G, base.H, A[A.shape[0] - y : half], A[half:])
 
-    def unfixed(self, program, lower, upper):
+    def _unfixed(self, lpec, w, sets, program):
         """A program in which first values of the part after the copy are not fixed by its sides: they are those of the copy now."""
-        j, low, high = list(self._of_following), program.lower.copy(), program.upper.copy()
+        sets = replace(sets, zero=np.where(self._parts.of_pair == self._following, FREE, sets.zero))
+        (lower, upper), j = lpec.box(w, sets, program.reach, beyond=True), list(self._of_following)
+        low, high = program.lower.copy(), program.upper.copy()
         low[j], high[j] = lower[j], upper[j]
         return replace(program, lower=low, upper=high)
 
@@ -111,3 +133,11 @@ class JoinedLpec:
         move[list(places)] = list(places.values())
         columns = np.where(chosen[entries.row], move[entries.col], entries.col)
         return sparse.csr_matrix((entries.data, (entries.row, columns)), (A.shape[0], self._n + len(self.own)))
+
+
+def linearised_at_both(lpec, w, other, sets, radius, equal):
+    """Active sets, decisions and LPECs at two points; None where they are not of the same form."""
+    (sets, equal, base), (others, _, there) = (lpec.linearised(at, sets, radius, equal, beyond=True) for at in (w, other))
+    if not (sets.same_sides(others) and np.array_equal(sets.gamma, others.gamma)):
+        return None
+    return sets, equal, base, there

@@ -15,6 +15,8 @@ from pyomo_fesd.mpcc.compile import with_entries
 
 #: Instead of the number of a part: of none, and of several.
 NONE, SHARED = -1, -2
+#: Parts that are shorter than this, relative to the longest one beside them, have nearly no extent.
+SHORT = 0.01
 
 
 class Parts:
@@ -26,6 +28,10 @@ class Parts:
     def __init__(self, c):
         self._c, self.all = c, c.parts
         self.by_extent = {part.extent: k for k, part in enumerate(c.parts)}
+
+    def may_be_copied(self, k):
+        """Whether copies of part ``k`` may be inserted; where amounts lie in fillings depends on all extents before them."""
+        return self.all[k].copies and not self._c.fillings
 
     def next(self, k):
         """The number of the part after part ``k``; None without one."""
@@ -41,6 +47,11 @@ class Parts:
     def beside(self, k):
         """The numbers of the parts before and after part ``k``, where there are any."""
         return tuple(j for j in (self.previous(k), self.next(k)) if j is not None)
+
+    def is_beside_a_short_one(self, w, k):
+        """Whether part ``k`` or one beside it has nearly no extent: what it holds need not be what follows or precedes."""
+        beside = [w[self.all[j].extent] for j in (k - 1, k, k + 1) if 0 <= j < len(self.all)]
+        return min(beside) < SHORT * max(beside)
 
     @cached_property
     def of_variable(self):

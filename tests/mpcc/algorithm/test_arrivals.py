@@ -27,10 +27,15 @@ def toggles(*gauges):
     return tuple(ToggleIndices(np.array([pair]), None, gauge, NONE, NONE) for pair, gauge in enumerate(gauges))
 
 
-def found(arrivals, zero, gauges, extents):
+def both(arrivals, zero, gauges, extents):
+    """The branches, each with the changed end."""
     compiled = SimpleNamespace(arrivals=arrivals, measured=lambda w: np.array(gauges, dtype=float))
     zero = np.array(zero)
     return list(branches(compiled, np.array(extents, dtype=float), ActiveSets(zero, np.zeros(len(zero), dtype=bool)), 1e-6))
+
+
+def found(*given):
+    return [entered for entered, _ in both(*given)]
 
 
 ONE_MODE = [G_ZERO, H_ZERO]
@@ -39,8 +44,8 @@ BOTH = [H_ZERO, H_ZERO]
 
 
 def test_a_surface_at_the_end_leads_to_the_other_mode_or_onto_it():
-    (single, both) = found([ArrivalIndices((row(2),), toggles(0, 1), ())], ONE_MODE * 2, [0, 0], [1, 1])
-    for entered, mode in ((single, BOTH), (both, OTHER_MODE)):
+    (onto, beyond) = found([ArrivalIndices((row(2),), toggles(0, 1), ())], ONE_MODE * 2, [0, 0], [1, 1])
+    for entered, mode in ((onto, BOTH), (beyond, OTHER_MODE)):
         assert entered.zero.tolist() == [*mode, *ONE_MODE] and entered.extents.tolist() == [0]
         assert entered.start.tolist() == [0, 2]
 
@@ -59,6 +64,18 @@ def test_modes_move_inwards_up_to_the_first_equal_ones():
 def test_without_a_place_to_spare_the_order_is_open():
     arrival = ArrivalIndices((row(2),), toggles(0, 1), ())
     assert found([arrival], [*ONE_MODE, *OTHER_MODE], [0, 0], [1, 1]) == [None, None]
+
+
+def test_the_place_at_the_end_alone_needs_no_place_to_spare():
+    arrival = ArrivalIndices((row(2),), toggles(0, 1), ())
+    for (_, changed), mode in zip(both([arrival], [*ONE_MODE, *OTHER_MODE], [0, 0], [1, 1]), (BOTH, OTHER_MODE), strict=True):
+        assert (changed.extent, changed.inner) == (0, 1) and changed.zero.tolist() == [*mode, *OTHER_MODE]
+        assert (changed.targets.tolist(), changed.sources.tolist()) == ([2, 3], [0, 1])
+
+
+def test_the_place_at_the_end_alone_is_none_between_two_rows():
+    zero, arrival = ONE_MODE * 4, ArrivalIndices((row(2), row(2)), toggles(0, 1), ())
+    assert all(changed is None for _, changed in both([arrival], zero, [0, 0], [1, 1]))
 
 
 def test_an_option_needs_its_mode_and_its_gauge():

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from problems import inserted
 
-from pyomo_fesd.mpcc.subproblems.inserted_copy import Copy
-from pyomo_fesd.mpcc.subproblems.insertion import Insertion
+from pyomo_fesd.mpcc.subproblems.inserted_copy import Copy, Insertion
 
 
 def copy_of(s, k, source, ahead=False):

@@ -6,7 +6,7 @@ from problems import inserted
 from scipy import sparse
 
 from pyomo_fesd.mpcc.subproblems.active_set import ActiveSets
-from pyomo_fesd.mpcc.subproblems.insertion import Insertion
+from pyomo_fesd.mpcc.subproblems.inserted_copy import Insertion
 from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec
 from pyomo_fesd.mpcc.subproblems.lpec import Lpec
 

@@ -21,7 +21,7 @@ def of_hand():
     parts, places = [], [(0, 0), (0, 1), (1, 0)]
     for own, before, place in zip(PARTS, (0, 4, 0), places):
         gate, last = np.array(own[1:2]), np.array(own[3:])
-        parts.append(PartIndices(own[0], np.array(own), gate, np.array([before]), last, last, *place, whole=True, copies=True))
+        parts.append(PartIndices(own[0], np.array(own), gate, np.array(own), np.array([before]), last, last, *place, True, True))
     columns = [row for row, _ in ROWS] + [first for first, *_ in PAIRS] + [second for _, second, *_ in PAIRS]
     J = np.zeros((len(columns), 13))
     for row, entries in zip(J, columns):
