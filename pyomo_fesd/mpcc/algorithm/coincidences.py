@@ -123,7 +123,7 @@ class Coincidences:
         return not self._c.gradients(point.w)[0].any()
 
     def _holds_anything(self, w, sets):
-        """Whether a place at its least extent has a bi-active pair: it would hold anything, and the LPEC takes its values for rates."""
+        """Whether a place at its least extent has a bi-active pair: any values would do, and the LPEC takes them for rates."""
         parts = self._subsolves.parts
         least = [k for k, part in enumerate(parts.all) if w[part.extent] <= self._c.lbx[part.extent] + NEAR_BOUND]
         return bool(len(least)) and bool(np.isin(parts.of_pair[sets.gamma], least).any())
