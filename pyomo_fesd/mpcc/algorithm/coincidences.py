@@ -123,9 +123,13 @@ class Coincidences:
         return not self._c.gradients(point.w)[0].any()
 
     def _holds_anything(self, w, sets):
-        """Whether a place at its least extent has a bi-active pair: any values would do, and the LPEC takes them for rates."""
+        """Whether a place of least extent at an end has a bi-active pair: any values would do, and the LPEC takes them for rates.
+
+        Elsewhere the orders are tried as if it were none (``_situations``).
+        """
         parts = self._subsolves.parts
-        least = [k for k, part in enumerate(parts.all) if w[part.extent] <= self._c.lbx[part.extent] + NEAR_BOUND]
+        ends = [k for k in range(len(parts.all)) if len(parts.beside(k)) < 2]
+        least = [k for k in ends if w[parts.all[k].extent] <= self._c.lbx[parts.all[k].extent] + NEAR_BOUND]
         return bool(len(least)) and bool(np.isin(parts.of_pair[sets.gamma], least).any())
 
     @staticmethod
