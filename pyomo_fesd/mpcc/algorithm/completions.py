@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.state import Point
+from pyomo_fesd.mpcc.algorithm.subsolves import INFEASIBLE
 from pyomo_fesd.mpcc.nlp import NlpResult
 from pyomo_fesd.mpcc.subproblems import Stationarity
 
@@ -28,6 +29,8 @@ SHARE = 0.6
 LONGER, LEAST_TIME = 2.0, 2.0
 #: Branch NLPs from one relaxation: one that stops on its way has better values of the free variables, but perhaps the wrong branch.
 ATTEMPTS = 2
+#: Two relaxations with objectives as close as this, relative, have the same solution.
+SAME = 1e-8
 #: Products of eps carry round-off.
 ROUND_OFF = 1.001
 
@@ -48,6 +51,7 @@ class Completions:
         self._subsolves, self._branches, self.run = subsolves, branches, subsolves.run
         self._form = 'scholtes' if self._options.relaxation == 'auto' else self._options.relaxation
         self._deadline, self._promise, self._possible = setup.deadline.part(SHARE), -np.inf, False
+        self._objectives = []
 
     def follow(self, start):
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
@@ -60,11 +64,16 @@ class Completions:
             self._certify()
 
     def _down(self, w, eps):
-        """Rounds with ever smaller eps, each from the relaxation before; returns whether many did not reach their solutions."""
+        """Rounds with ever smaller eps, each from the relaxation before; returns whether many did not reach their solutions.
+
+        The points of a relaxation with a smaller eps are among those of one before: after an infeasible one there is none.
+        """
         solved = []
         while eps * ROUND_OFF >= max(LAST, self._options.eps_final) and not self._deadline.expired():
             relaxed = self._round(w, eps)
             solved.append(relaxed.solved)
+            if relaxed.status in INFEASIBLE:
+                break
             w = relaxed.w
             eps *= self._options.eps_factor
         return solved.count(False) >= ASTRAY * len(solved)
@@ -88,22 +97,33 @@ class Completions:
         return point is None or point.f - self._promise > GAP * abs(point.f)
 
     def _round(self, w, eps):
-        """One relaxation from ``w``, and the branch of its completion; returns the relaxation's result."""
+        """One relaxation from ``w``, and the branch of its completion, unless it is known; returns the relaxation's result."""
         self.run.eps = eps
         began = time.perf_counter()
         relaxed = self._subsolves.relax(self._form, w, eps, None, self._options.relaxation_iterations)
         self._subsolves.keep_least_infeasible(relaxed.w)
         if eps <= AROUND[0] * ROUND_OFF and self._subsolves.usable(relaxed):
             self._promise = self._c.evaluate(relaxed.w).f
-        seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
+        if not self._is_known(relaxed):
+            self._explore(relaxed.w, max(LEAST_TIME, LONGER * (time.perf_counter() - began)))
+        self._after(self.run)
+        return relaxed
+
+    def _is_known(self, relaxed):
+        """Whether a relaxation before had the same solution."""
+        f = self._c.evaluate(relaxed.w).f
+        is_known = relaxed.solved and any(abs(f - other) <= SAME * abs(f) for other in self._objectives)
+        self._objectives += [f] if relaxed.solved else []
+        return is_known
+
+    def _explore(self, w, seconds):
+        """Solve the branch of the completion of ``w`` without guide bounds."""
         narrow = self._c.widen()
         try:
-            self._branch_of_completion(relaxed.w, seconds)
+            self._branch_of_completion(w, seconds)
         finally:
             if narrow:
                 self._c.narrow()
-        self._after(self.run)
-        return relaxed
 
     def _branch_of_completion(self, w, seconds):
         """Solve the branch that the completion of ``w`` names; where that stops on its way, the completion of its end once more."""

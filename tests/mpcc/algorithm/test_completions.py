@@ -1,5 +1,6 @@
 """Rounds of relaxation, completion and branch: kept if feasible and better, certified at the end."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -65,6 +66,21 @@ def test_rounds_go_around_the_best_point_and_end_without_progress():
     eps = [entry.eps for entry in p.kinds('relaxation')]
     assert eps[:4] == pytest.approx([1, 1e-1, 1e-2, 1e-3])
     assert eps[4:] == pytest.approx(AROUND)
+
+
+def test_a_relaxation_with_a_solution_that_is_known_is_not_completed_again():
+    p, rounds, asked = completions(lambda x: (0.3, True))
+    for _ in range(2):
+        rounds._round(p.compiled.x0, 1.0)
+    assert len(p.kinds('relaxation')) == 2 and len(asked) == 1
+
+
+def test_no_relaxation_follows_an_infeasible_one(monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    relax = p.subsolves.relax
+    monkeypatch.setattr(p.subsolves, 'relax', lambda *args: replace(relax(*args), status='Infeasible_Problem_Detected'))
+    rounds._down(p.compiled.x0, 1.0)
+    assert len(p.kinds('relaxation')) == 1
 
 
 @pytest.mark.parametrize('part, follows', [(0.4, True), (0.6, False)])
