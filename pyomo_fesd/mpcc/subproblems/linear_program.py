@@ -6,10 +6,15 @@ Takes: a program whose columns have a known reach.
 Leaves: a point, the rows' multipliers where there are no binaries, and HiGHS' bound; None where HiGHS' own answer does not hold.
 """
 
+import os
 from dataclasses import dataclass
 
 import highspy
 import numpy as np
+
+if hasattr(os, 'register_at_fork') and hasattr(highspy.Highs, 'resetGlobalScheduler'):
+    # the worker threads of HiGHS do not exist in a forked process, where it would wait for them for ever (HiGHS 1.16.0)
+    os.register_at_fork(after_in_child=lambda: highspy.Highs.resetGlobalScheduler(False))
 
 #: HiGHS' own 1e-7 is too coarse.  With such tolerances its presolve calls some LPECs infeasible although d = 0 is feasible, and
 #: d = 0 optimal in others that have descent, so it stays off.  The dual simplex method may cycle at such tolerances, at the optimum

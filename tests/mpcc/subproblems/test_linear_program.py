@@ -1,5 +1,8 @@
 """Linear programs in HiGHS: the answer, and the attempts where a method does not end."""
 
+import multiprocessing
+import os
+
 import numpy as np
 import pytest
 from scipy import sparse
@@ -29,3 +32,22 @@ def test_only_attempts_before_the_last_have_a_limit_and_binaries_skip_the_primal
     limits = [attempt.get('simplex_iteration_limit') for attempt in relaxed]
     assert limits[-1] is None and set(limits[:-1]) == {linear_program.ITERATIONS * 15}
     assert len(mixed) == len(relaxed) - 1 and not any('simplex_iteration_limit' in attempt for attempt in mixed)
+
+
+def knapsack(items=30, rows=20):
+    """max c x, A x <= 6, x binary: not solved at the root."""
+    random = np.random.default_rng(0)
+    A, ones = sparse.csr_matrix(random.uniform(0, 1, (rows, items))), np.ones(items)
+    return Program(-random.uniform(0, 1, items), A, np.full(rows, -np.inf), np.full(rows, items / 5), 0 * ones, ones, ones, items)
+
+
+@pytest.mark.skipif(not hasattr(os, 'fork'), reason='no fork on this system')
+def test_a_forked_process_solves_programs_too():
+    # the worker threads that HiGHS 1.16.0 has started do not exist there
+    solve(knapsack(), {}, Deadline())
+    child = multiprocessing.get_context('fork').Process(target=solve, args=(knapsack(), {}, Deadline()))
+    child.start()
+    child.join(60)
+    stuck = child.is_alive()
+    child.kill()
+    assert not stuck
