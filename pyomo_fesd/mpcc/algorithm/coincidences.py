@@ -107,10 +107,12 @@ class Coincidences:
 
     def _order(self, point, order):
         """A better point in an order; or its outcome."""
-        verdicts = [judge() for judge in order.judges]
-        if Verdict.IMPOSSIBLE in verdicts or Verdict.NO_DESCENT in verdicts:
-            return SETTLED
-        inserts = any(verdict is not Verdict.NONE for verdict in verdicts)
+        inserts = False
+        for judge in order.judges:
+            verdict = judge()
+            if verdict in (Verdict.IMPOSSIBLE, Verdict.NO_DESCENT):
+                return SETTLED
+            inserts |= verdict is not Verdict.NONE
         found = self._first(partial(self._try, point, inserts), order.ways)
         if found is ABSENT:
             # that no branch contains the point is no proof, as there may be no place to spare; but where nothing can be inserted

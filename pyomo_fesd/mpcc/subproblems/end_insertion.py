@@ -17,7 +17,7 @@ from scipy import sparse
 from pyomo_fesd.mpcc.subproblems.active_set import ActiveSets
 from pyomo_fesd.mpcc.subproblems.end_values import EndValues
 from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec, linearised_at_both
-from pyomo_fesd.mpcc.subproblems.verdict import Verdict, of_lpec
+from pyomo_fesd.mpcc.subproblems.verdict import Verdict, of_growth
 
 #: Agreement of gradients, relative to the largest one.
 SAME = 1e-6
@@ -40,10 +40,11 @@ class EndInsertions:
             verdict = self._by_values(values)
             if verdict is not None:
                 return verdict
-            found = self._by_lpec(sets, equal, values, 0.0)
-            if found is not None and found.descent > self._tolerances.descent:
-                found = self._by_lpec(sets, equal, values, self._credit(w, sets, equal, order))
-        return of_lpec(found, self._tolerances.descent)
+            return of_growth(
+                lambda credit: self._by_lpec(sets, equal, values, credit),
+                lambda: self._unchanged(w, sets, equal, order),
+                self._tolerances.descent,
+            )
 
     def _applies(self, w, sets, order):
         end, inner = (self._parts.all[k] for k in (order.end, order.inner))
@@ -63,14 +64,10 @@ class EndInsertions:
             return Verdict.IMPOSSIBLE
         return Verdict.UNKNOWN if values.vanished.misses() else None
 
-    def _credit(self, w, sets, equal, order):
-        """The descent, for each unit of its extent, of a part at the end that changes nothing: the error of the method."""
+    def _unchanged(self, w, sets, equal, order):
+        """The LPEC with a part at the end that changes nothing (None without one), and the place of its extent."""
         values = self._values(w, sets, replace(order, zero=sets.zero))
-        found = self._by_lpec(sets, equal, values, 0.0) if values.solve() else None
-        if found is None or not found.solved or found.descent <= self._tolerances.descent:
-            return 0.0
-        grown = found.d[values.extent]
-        return -found.value / grown if grown > 0 else 0.0
+        return self._by_lpec(sets, equal, values, 0.0) if values.solve() else None, values.extent
 
     def _by_lpec(self, sets, equal, values, credit):
         """The LPEC in which the part at the end may grow at ``credit`` more for each unit; None where it is not known."""

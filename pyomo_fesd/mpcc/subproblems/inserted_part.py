@@ -72,13 +72,10 @@ class InsertedPart:
         w[fixed] = at
         free = np.setdiff1d(self._columns, fixed)
         for _ in range(STEPS):
-            J = self._c.stacked_jacobian(w)[rows]
-            residual = (self._values(w) - self._low)[rows]
-            scale = _largest(J)
-            A = (sparse.diags(1 / scale) @ J)[:, free]
-            step, determined = self._step(A, residual / scale, w, free)
+            A, residual, scale = self._scaled(w, rows, free)
+            step, determined = self._step(A, residual, w, free)
             w[free] += step
-            if np.abs(step).max(initial=0.0) <= LAST_STEP * max(1.0, np.abs(w[free]).max(initial=0.0)):
+            if _is_last(step, w[free]):
                 left = np.abs((self._values(w) - self._low)[rows] / scale).max(initial=0.0)
                 self.determined = determined
                 return w if (determined or any_of) and left <= RESIDUAL else None
@@ -125,12 +122,10 @@ class InsertedPart:
         w[fixed] = at
         free = np.setdiff1d(self._columns, fixed)
         for _ in range(STEPS):
-            J, residual = self._c.stacked_jacobian(w)[rows], (self._values(w) - self._low)[rows]
-            scale = _largest(J)
-            A = (sparse.diags(1 / scale) @ J)[:, free].toarray()
-            step = np.linalg.lstsq(A, -residual / scale, rcond=None)[0]
+            A, residual, _ = self._scaled(w, rows, free)
+            step = np.linalg.lstsq(A.toarray(), -residual, rcond=None)[0]
             w[free] += step
-            if np.abs(step).max(initial=0.0) <= LAST_STEP * max(1.0, np.abs(w[free]).max(initial=0.0)):
+            if _is_last(step, w[free]):
                 break
         return w
 
@@ -172,6 +167,12 @@ class InsertedPart:
         some = some[~np.isin(some, fixed)]
         weights = np.linalg.lstsq(basis[:, some].T, gradient[some], rcond=SINGULAR)[0]
         return float(np.abs(gradient[some] - basis[:, some].T @ weights).max(initial=0.0))
+
+    def _scaled(self, w, rows, free):
+        """Jacobian of the rows by free variables and residual, each row over its largest entry; and these entries."""
+        J = self._c.stacked_jacobian(w)[rows]
+        scale = _largest(J)
+        return (sparse.diags(1 / scale) @ J)[:, free], (self._values(w) - self._low)[rows] / scale, scale
 
     def _values(self, w):
         at = self._c.evaluate(w)
@@ -255,6 +256,11 @@ def _solution(A, b):
     # an estimate from below: beyond a hundredth of the limit the singular values decide
     is_clear = np.isfinite(step).all() and onenormest(inverse) * norm(A, 1) < CLEARLY / SINGULAR
     return step if is_clear else None
+
+
+def _is_last(step, values):
+    """Whether the Newton steps end with this one."""
+    return np.abs(step).max(initial=0.0) <= LAST_STEP * max(1.0, np.abs(values).max(initial=0.0))
 
 
 def _least_violation(A, residual, low, high):

@@ -21,7 +21,7 @@ from pyomo_fesd.mpcc.subproblems.active_set import ActiveSets
 from pyomo_fesd.mpcc.subproblems.inserted_copy import Copy, Insertion
 from pyomo_fesd.mpcc.subproblems.inserted_part import InsertedPart
 from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec, linearised_at_both
-from pyomo_fesd.mpcc.subproblems.verdict import Verdict, of_all, of_lpec
+from pyomo_fesd.mpcc.subproblems.verdict import Verdict, of_all, of_growth
 
 
 class Insertions:
@@ -66,10 +66,11 @@ class Insertions:
         verdict = self._by_values(w, insertion, copy, guess)
         if verdict is not None or present is None:
             return verdict or Verdict.UNKNOWN
-        found = self._by_lpec(w, sets, equal, insertion, copy, 0.0)
-        if found is not None and found.descent > self._tolerances.descent:
-            found = self._by_lpec(w, sets, equal, insertion, copy, self._credit(w, sets, equal, present))
-        return of_lpec(found, self._tolerances.descent)
+        return of_growth(
+            lambda credit: self._by_lpec(w, sets, equal, insertion, copy, credit),
+            lambda: self._unchanged(w, sets, equal, present),
+            self._tolerances.descent,
+        )
 
     def at_limit(self, w, zero, extents, size):
         """``w`` with the values that parts of extent 0 have as they grow, which their equations may not determine at 0.
@@ -110,23 +111,15 @@ class Insertions:
             return Verdict.UNKNOWN if copy.misses() else None
         return Verdict.IMPOSSIBLE if copy.contradicts_itself(w, insertion.guesses) else Verdict.UNKNOWN
 
-    def _credit(self, w, sets, equal, present):
-        """The descent, for each unit of its extent, of a copy that changes nothing: the error of the method."""
-        copy = self._copy(w, present)
-        found = None if copy is None else self._by_lpec(w, sets, equal, present, copy, 0.0)
-        if found is None or not found.solved or found.descent <= self._tolerances.descent:
-            return 0.0
-        grown = found.d[len(w) + int(np.flatnonzero(copy.own == copy.part.extent)[0])]
-        return -found.value / grown if grown > 0 else 0.0
+    def _unchanged(self, w, sets, equal, present):
+        """The LPEC with a copy that changes nothing (None without one), and the place of its extent."""
+        copy = Copy(self._c, self._sides, self._parts, present)
+        found = self._by_lpec(w, sets, equal, present, copy, 0.0) if copy.solve(w, present.guesses) else None
+        return found, len(w) + int(np.flatnonzero(copy.own == copy.part.extent)[0])
 
     def _following(self, insertion):
         """The part after the copy."""
         return insertion.k if insertion.ahead else self._parts.next(insertion.k)
-
-    def _copy(self, w, insertion):
-        """The copy with its values at the limit; None without one."""
-        copy = Copy(self._c, self._sides, self._parts, insertion)
-        return copy if copy.solve(w, insertion.guesses) else None
 
     def _beside(self, w, present, insertion, copy):
         """The point in which the part after the copy begins with its last values; None if its beginning is not determined."""

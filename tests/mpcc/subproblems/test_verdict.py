@@ -2,21 +2,52 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from pyomo_fesd.mpcc.subproblems import Verdict
-from pyomo_fesd.mpcc.subproblems.verdict import of_all, of_lpec
+from pyomo_fesd.mpcc.subproblems.verdict import of_all, of_growth
+
+
+def lpec(slope, solved=True):
+    """An LPEC with one variable, which may grow by 1 with this slope, at a cost of each unit."""
+
+    def best(credit):
+        grown = float(slope + credit < 0.0)
+        value = min(slope + credit, 0.0)
+        return SimpleNamespace(solved=solved, value=value, descent=-value, d=np.array([grown]))
+
+    return best
+
+
+def unchanged(slope):
+    return lambda: (lpec(slope)(0.0), 0)
 
 
 @pytest.mark.parametrize(
-    'solved, descent, verdict', [(True, 1e-7, Verdict.NO_DESCENT), (True, 1e-5, Verdict.DESCENT), (False, 0.0, Verdict.UNKNOWN)]
+    'slope, solved, verdict',
+    [
+        (-1e-7, True, Verdict.NO_DESCENT),
+        (-1e-5, True, Verdict.DESCENT),
+        (1.0, True, Verdict.NO_DESCENT),
+        (0.0, False, Verdict.UNKNOWN),
+    ],
 )
-def test_an_lpec_decides_if_it_was_solved(solved, descent, verdict):
-    assert of_lpec(SimpleNamespace(solved=solved, descent=descent), 1e-6) is verdict
+def test_an_lpec_decides_if_it_was_solved(slope, solved, verdict):
+    assert of_growth(lpec(slope, solved), unchanged(0.0), 1e-6) is verdict
+
+
+@pytest.mark.parametrize('slope, verdict', [(-1e-3, Verdict.NO_DESCENT), (-2e-3, Verdict.DESCENT)])
+def test_descent_of_a_part_that_changes_nothing_does_not_count(slope, verdict):
+    assert of_growth(lpec(slope), unchanged(-1e-3), 1e-6) is verdict
+
+
+def test_where_nothing_is_known_of_an_unchanged_part_all_descent_counts():
+    assert of_growth(lpec(-1e-3), lambda: (None, 0), 1e-6) is Verdict.DESCENT
 
 
 def test_without_an_lpec_nothing_is_decided():
-    assert of_lpec(None, 1e-6) is Verdict.UNKNOWN
+    assert of_growth(lambda credit: None, unchanged(0.0), 1e-6) is Verdict.UNKNOWN
 
 
 def test_copies_show_no_descent_only_if_all_of_them_do():
