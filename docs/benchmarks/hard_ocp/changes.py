@@ -2,8 +2,8 @@
 
     .venv/bin/python docs/benchmarks/hard_ocp/changes.py [--only discs] [--forms contact] [--changes 'base;scholtes'] [--limit 60]
 
-Each row is a run from the model's own initial values at the defaults but for one change; 'base' has none.  A run ends at its limit
-of CPU seconds.  Writes changes.csv, one row a run; runs that have a row are skipped.
+Each row is a run from the model's own initial values at the defaults but for one change; 'base' has none.  A run ends at its time
+limit.  Writes changes.csv, one row a run; runs that have a row are skipped.
 """
 
 import argparse
@@ -110,7 +110,7 @@ def main():
     parser.add_argument('--forms', type=run.names, default=FORMS, help="contact, time_freezing")
     parser.add_argument('--changes', type=lambda text: text.split(';'), default=list(CHANGES), help="by name, ';' between")
     parser.add_argument('--fresh', action='store_true', help="delete the existing rows first")
-    parser.add_argument('--limit', type=float, default=60, help="CPU seconds for each run")
+    parser.add_argument('--limit', type=float, default=60, help="seconds for each run")
     chosen = parser.parse_args()
     study(chosen.only, chosen.forms, chosen.changes, chosen.limit, chosen.fresh)
 

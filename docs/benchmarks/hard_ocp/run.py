@@ -47,7 +47,7 @@ def in_process(problem, method, seed, options, limit):
     """Measure one case in a process of its own; a dict."""
     given = [f'{name}={value!r}' for name, value in options.items()]
     arguments = ('--case', problem, '--form', method, '--seed', seed, '--limit', limit, '--options', *given)
-    lines, status = json_lines(__file__, *arguments, limit=cases.WAIT * limit + 60)
+    lines, status = json_lines(__file__, *arguments, limit=2 * cases.KILL * limit)
     row = {'problem': problem, 'method': method, 'seed': seed, 'limit': limit}
     return row | (lines[-1] if lines else {'status': died(status, limit)})
 
@@ -95,7 +95,7 @@ def main():
     parser.add_argument('--methods', type=names, default=tuple(summary.METHODS), help="contact, time_freezing, nosnoc")
     parser.add_argument('--seeds', type=int, default=SEEDS, help="number of starts")
     parser.add_argument('--fresh', action='store_true', help="delete the existing rows first")
-    parser.add_argument('--limit', type=float, default=180, help="CPU seconds for each run")
+    parser.add_argument('--limit', type=float, default=180, help="seconds for each run")
     parser.add_argument('--summary', action='store_true', help="run nothing")
     parser.add_argument('--case', help="solve this problem only, and print one line")
     parser.add_argument('--form', default='contact', help="of the case: contact, time_freezing, or nosnoc")

@@ -224,9 +224,11 @@ class Branches:
 
     def _within_round_off(self, point):
         """A clearly better point in the branch of a direction whose descent matters, though it proves nothing."""
-        step, enough = point.certificate.lpec, point.f - MATTERS * abs(point.f)
+        step = point.certificate.lpec
         if step is None or not step.matters:
             return None
+        # with an objective of 0 any other point would be as good
+        enough = point.f - MATTERS * max(abs(point.f), -step.value)
         found = (self.solutions.certified(w, step.zero, max_iter=SECOND) for w in (point.w + step.d, point.w))
         return next((better for better in found if is_below(better, enough)), None)
 

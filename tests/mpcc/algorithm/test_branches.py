@@ -71,6 +71,15 @@ def test_a_descent_within_the_round_off_of_large_terms_is_followed_where_it_matt
     assert first.status == last.status == 'B' and (first.f, last.f) == pytest.approx((1, 0.7), rel=1e-6)
 
 
+def test_a_descent_that_matters_and_leads_nowhere_ends_also_at_an_objective_of_zero(monkeypatch):
+    p = at_point(trap(), True)
+    certificate = p.run.point.certificate
+    descent = replace(certificate, lpec=replace(certificate.lpec, value=-1e-6, matters=True))
+    point = replace(p.run.point, f=0.0, certificate=descent)
+    monkeypatch.setattr(p.branches.solutions, 'certified', lambda *given, **options: point)
+    assert p.branches.descend(point, True) is None
+
+
 def test_it_is_kept_uncertified_while_the_homotopy_promises_something_better():
     p = at_point(trap(), False)
     assert p.run.point.certificate.grade is Stationarity.DESCENT
