@@ -7,11 +7,11 @@ SETTINGS = Path(__file__).parents[1] / 'setup.cfg'
 
 
 def lowest_bounds():
-    """Return one constraint for each requirement of ``install_requires``, written as ``name>=version`` or with ``,!=version``."""
+    """Return one constraint for each requirement of ``install_requires``, written as ``name>=version``."""
     settings = configparser.ConfigParser()
     settings.read(SETTINGS)
     requirements = settings['options']['install_requires'].split()
-    return [requirement.split(',')[0].replace('>=', '==') for requirement in requirements]
+    return [requirement.replace('>=', '==') for requirement in requirements]
 
 
 if __name__ == '__main__':

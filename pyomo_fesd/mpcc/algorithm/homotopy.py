@@ -25,6 +25,8 @@ WITH_MULTIPLIERS = 1e-2
 #: From this eps on a relaxation is worth a branch NLP, which is much cheaper than the next relaxation, unless more than this part
 #: of the pairs is undecided.
 LATE, UNDECIDED = 1e-3, 0.5
+#: So is one with products below this: the elastic form ends near a solution already at its first eps.
+NEARLY = 1e-6
 #: With products below this and the same active sides as before, a smaller eps changes nothing.
 EXHAUSTED = 1e-8
 #: Products of eps_factor carry round-off.
@@ -156,7 +158,7 @@ class Homotopy:
         self._gap.add(position.eps, at.f)
         self.finished = position.eps <= options.eps_final * ROUND_OFF
         exhausted = product <= EXHAUSTED and sets.same_sides(position.sets)
-        explores = self._worth_a_branch(position, sets)
+        explores = self._worth_a_branch(position, sets, product)
         named = self._branches.explore(relaxed, sets, self.finished or exhausted) if explores else None
         self._after(self.run)
         if explores and self._settled(position.named, named):
@@ -167,12 +169,12 @@ class Homotopy:
         eps = max(min(position.eps, product) * options.eps_factor, options.eps_final)
         return _Position(position.path, relaxed.w, eps, self._form(position), relaxed, sets, named)
 
-    def _worth_a_branch(self, position, sets):
+    def _worth_a_branch(self, position, sets, product):
         """Whether the active sets are clear enough for a branch NLP, or the last ones."""
         if self._branches is None:
             return False
         undecided = np.count_nonzero(sets.gamma)
-        late = position.eps <= LATE * ROUND_OFF and undecided <= UNDECIDED * len(sets.gamma)
+        late = (position.eps <= LATE * ROUND_OFF or product <= NEARLY) and undecided <= UNDECIDED * len(sets.gamma)
         return self.finished or late or not undecided or sets.same_sides(position.sets)
 
     def _settled(self, before, now):

@@ -6,15 +6,10 @@ Takes: a program whose columns have a known reach.
 Leaves: a point, the rows' multipliers where there are no binaries, and HiGHS' bound; None where HiGHS' own answer does not hold.
 """
 
-import os
 from dataclasses import dataclass
 
 import highspy
 import numpy as np
-
-if hasattr(os, 'register_at_fork') and hasattr(highspy.Highs, 'resetGlobalScheduler'):
-    # the worker threads of HiGHS do not exist in a forked process, where it would wait for them for ever (HiGHS 1.16.0)
-    os.register_at_fork(after_in_child=lambda: highspy.Highs.resetGlobalScheduler(False))
 
 #: HiGHS' own 1e-7 is too coarse.  With such tolerances its presolve calls some LPECs infeasible although d = 0 is feasible, and
 #: d = 0 optimal in others that have descent, so it stays off.  The dual simplex method may cycle at such tolerances, at the optimum
@@ -29,6 +24,8 @@ ATTEMPTS = (
 #: Iterations of the simplex method without binaries before the next attempt, for each row and column; the last has no limit.
 ITERATIONS = 3
 TOLERANCES = ('primal_feasibility_tolerance', 'dual_feasibility_tolerance', 'mip_feasibility_tolerance')
+#: The programs are small, and other threads of HiGHS would not exist in a forked process, which would wait for them.
+THREADS = {'threads': 1}
 #: The equilibrated cost has entries up to 1; the defaults (1e-6 and 1e-4) would call d = 0 optimal beside a small descent.
 GAPS = {'mip_abs_gap': 1e-9, 'mip_rel_gap': 1e-6}
 #: d = 0 is a first solution; to search for one takes most of the time of a small program.
@@ -109,7 +106,7 @@ def solve(program, options, deadline, start=None, clear=False, limits=None):
             guess = highspy.HighsSolution()
             guess.col_value = list(start / program.reach)
             highs.setSolution(guess)
-        highs.run()
+        _run(highs)
         answer = _answer(highs, p, bool(limits))
         if answer is not None:
             y = None if answer.y is None else answer.y * rows / factor
@@ -134,9 +131,18 @@ def infeasible(program) -> bool:
     """Whether HiGHS shows that a program has no point."""
     highs = highspy.Highs()
     highs.setOptionValue('output_flag', False)
+    highs.setOptionValue('threads', THREADS['threads'])
     highs.passModel(_highs_model(program.equilibrated()[0]))
-    highs.run()
+    _run(highs)
     return highs.getModelStatus() == highspy.HighsModelStatus.kInfeasible
+
+
+def _run(highs):
+    """Run HiGHS, also where the last run in this thread, perhaps of another tool, had another number of threads."""
+    if highs.run() == highspy.HighsStatus.kError:
+        # it does not wait for these threads: after a fork they do not exist
+        highspy.Highs.resetGlobalScheduler(False)
+        highs.run()
 
 
 def _answer(highs, p, limited):
@@ -175,7 +181,7 @@ def _attempts(p):
 
 def _settings(attempt, binaries, clear, deadline, given):
     """HiGHS options of one attempt; those that are ``given`` override ours, except for the deadline."""
-    settings = {'output_flag': False} | {name: value for name, value in attempt.items() if name != 'tolerance'}
+    settings = {'output_flag': False} | THREADS | {name: value for name, value in attempt.items() if name != 'tolerance'}
     if binaries:
         settings.pop('solver', None)
         settings |= GAPS | STARTED | ({'objective_target': -CLEAR_DESCENT} if clear else {})

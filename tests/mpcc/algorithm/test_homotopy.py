@@ -55,6 +55,17 @@ def test_where_the_elastic_form_is_complementary_at_once_eps_jumps_to_the_end():
     assert len(path) < 5 < len(relaxations(run(small_mpccs.toy(0.5, 0.2)[0], mode='relaxation', relaxation='scholtes')))
 
 
+def test_a_complementary_relaxation_is_worth_a_branch_at_the_first_eps_also_with_a_bi_active_pair():
+    m = pyo.ConcreteModel()
+    m.x, m.y = (pyo.Var(range(4), bounds=(0, None), initialize=0.5) for _ in range(2))
+    m.pairs = Complementarity(range(4), rule=lambda m, i: complements(m.x[i] >= 0, m.y[i] >= 0))
+    m.f = pyo.Objective(expr=sum((m.x[i] - 1) ** 2 + 3 * m.y[i] for i in range(3)) + m.x[3] + m.y[3])
+    results = run(m)
+    (only,) = relaxations(results)
+    assert (only.eps, only.biactive) == (1.0, 1)
+    assert results.extra_info.stationarity == 'B' and abs(results.incumbent_objective) < 1e-8
+
+
 def test_it_starts_and_ends_at_the_given_eps():
     path = relaxations(run(small_mpccs.toy(0.5, 0.2)[0], mode='relaxation', eps_init=0.3, eps_final=1e-4))
     assert (path[0].eps, path[-1].eps) == (0.3, 1e-4)

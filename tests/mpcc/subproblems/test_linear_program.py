@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 
+import highspy
 import numpy as np
 import pytest
 from scipy import sparse
@@ -41,10 +42,36 @@ def knapsack(items=30, rows=20):
     return Program(-random.uniform(0, 1, items), A, np.full(rows, -np.inf), np.full(rows, items / 5), 0 * ones, ones, ones, items)
 
 
-@pytest.mark.skipif(not hasattr(os, 'fork'), reason='no fork on this system')
-def test_a_forked_process_solves_programs_too():
-    # the worker threads that HiGHS 1.16.0 has started do not exist there
+def highs_with(threads):
+    """The answer of a HiGHS run of another tool in this thread."""
+    highs = highspy.Highs()
+    highs.setOptionValue('output_flag', False)
+    highs.setOptionValue('threads', threads)
+    return highs.run()
+
+
+@pytest.fixture
+def many_threads():
+    """HiGHS has run with 3 threads, and can run with any number afterwards."""
+    highspy.Highs.resetGlobalScheduler(True)
+    highs_with(3)
+    yield
+    highspy.Highs.resetGlobalScheduler(True)
+
+
+@pytest.mark.parametrize('options', [{}, {'threads': 2}])
+def test_it_runs_after_another_tool_has_set_the_number_of_threads(many_threads, options):
+    assert solve(knapsack(), options, Deadline()).d == pytest.approx(solve(knapsack(), {}, Deadline()).d)
+
+
+def test_after_it_another_tool_runs_with_one_thread():
     solve(knapsack(), {}, Deadline())
+    assert highs_with(1) == highspy.HighsStatus.kOk
+
+
+@pytest.mark.skipif(not hasattr(os, 'fork'), reason='no fork on this system')
+def test_a_forked_process_solves_programs_too(many_threads):
+    # the worker threads of the other tool do not exist there
     child = multiprocessing.get_context('fork').Process(target=solve, args=(knapsack(), {}, Deadline()))
     child.start()
     child.join(60)
