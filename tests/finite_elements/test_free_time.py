@@ -199,6 +199,10 @@ def with_times():
     return m
 
 
+#: A variable does not keep its model.
+OTHER = with_times()
+
+
 @pytest.mark.parametrize(
     'wrong, message',
     [
@@ -208,7 +212,7 @@ def with_times():
         (lambda m: 'T', 'T: final_time: not a single variable'),
         (lambda m: 3.0, 'final_time: not a single variable'),
         (lambda m: m.x[2], r'x\[2\]: final_time: it is a variable at one time'),
-        (lambda m: with_times().S[1], r'S\[1\]: final_time: it belongs to another model'),
+        (lambda m: OTHER.S[1], r'S\[1\]: final_time: it belongs to another model'),
     ],
     ids=['no bound', 'several', 'Param', 'name', 'number', 'over time', 'other model'],
 )
