@@ -24,8 +24,8 @@ from pyomo_fesd.mpcc.compile.casadi_matrices import csr
 from pyomo_fesd.mpcc.compile.scaling import MILD
 from pyomo_fesd.mpcc.compile.sparse_entries import largest_entries, major_index
 
-#: Variables of a size within these bounds keep their unit.
-ORDINARY = (1e-4, 1e4)
+#: Variables of a size within these bounds keep their unit: small ones are measured by 1, large ones by their value.
+ORDINARY = (1e-2, 1e4)
 #: So does an objective that changes by this much over the sizes of the variables.
 ORDINARY_OBJECTIVE = (1e-3, 1e6)
 #: An objective of this many times its own changes consists of an offset.
@@ -157,7 +157,7 @@ class _Evidence:
         least, most = np.full(self._rows, np.inf), np.full(self._rows, -np.inf)
         np.minimum.at(least, self.row, self.logarithm)
         np.maximum.at(most, self.row, self.logarithm)
-        wide = np.log(ORDINARY[1])
+        wide = -np.log(ORDINARY[0])
         return np.all(most - least < wide) and np.all(np.abs(np.log(bounds)) < wide)
 
     def fit(self, n, columns, bounds):

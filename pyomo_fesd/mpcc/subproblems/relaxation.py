@@ -101,7 +101,7 @@ class Relaxation:
         self._lbg = np.concatenate([c.lbg, np.zeros(signs), np.full(count, 0.0 if terms.equal else -np.inf)])
         self._ubg = np.concatenate([c.ubg, np.full(signs, np.inf), np.zeros(count)])
         nlp = composed(c, Outer(z, slack, eps, ca.SX(terms.cost), ca.vertcat(take(z, sides.chosen), terms.rows)))
-        limit = {'diverging_iterates_tol': DIVERGES * max(1.0, np.abs(c.x0).max(initial=0.0))}
+        limit = {'diverging_iterates_tol': DIVERGES * max(1.0, float(np.abs(c.x0).max(initial=0.0)))}
         self._nlp = make(form.__name__, nlp.x, nlp.p, nlp.f, nlp.g, LEADING | limit, nlp.derivatives)
 
     def solve(self, w, eps, duals=None, max_iter=None):
