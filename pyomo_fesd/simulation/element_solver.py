@@ -27,8 +27,9 @@ TRIES = (
     {'lpec': 'full'},
     {'lpec': 'full', 'starts': 6},
 )
-#: Where a solution can be followed for less than this part of a step, and no step is found, other searches and starts do not help.
-ENDS = 1e-3
+#: Where a solution can be followed for less than the first part of a step, and no step is found, other searches and starts do not
+#: help.  A switch that ends it is found in a step at most so many times as long as it was followed.
+ENDS, FOLLOWED = 1e-3, (2.0, 10.0)
 #: A step of length zero is a local solution of its own where a switch lies on the left boundary.  Then lengths of at least these
 #: parts of the aim are asked for; a step is longer by the last part, else the bound holds it.
 LEAST, BEYOND, LONGER = (1e-2, 1e-4), {'lpec': 'full', 'relaxation': 'elastic'}, 1e-3
@@ -211,8 +212,17 @@ class ElementSolver:
                 continue
             reached = element_class.followed(equations, self._end, most, self._left_boundary(equations, element))
             if 0 < reached < ENDS * most:
-                raise self._solution_ends(element_class, equations, most, reached, answer)
+                return self._beyond(element_class, equations, most, reached, answer, no_step)
         raise self._no_step(element_class, equations, most, answer, element)
+
+    def _beyond(self, element_class, equations, most, reached, answer, no_step):
+        """A step to a switch a little beyond the length up to which the solution is followed; without one this ends there."""
+        ends = self._solution_ends(element_class, equations, most, reached, answer)
+        for factor in FOLLOWED:
+            found, h = self._longest(element_class, equations, factor * reached, BEYOND)
+            if found.stationarity == 'B' and h > no_step:
+                return element_class.accept_mpcc(equations, factor * reached, h)
+        raise ends
 
     def _length_beyond(self, element_class, equations, most):
         """The length of a step that is not zero; 0 if none is found."""

@@ -29,6 +29,8 @@ QUICK = {
     'horizon 1e-3 to 1e5': (1, 40),
     'oscillator': (2,),
     'stiff mode, Radau': (1, 26),
+    # the first switch ends a layer of a thousandth of an element
+    'Van der Pol with dry friction': (14,),
     'gene network': (3,),
     'MPCC without time': (0, 1),
     'infeasible MPCC': (1,),
