@@ -121,12 +121,19 @@ class Branches:
         What a place of least extent holds is as small as the tolerances: the LPEC does not see that only the bound keeps it.
         """
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
-        for neighbour in self._c.neighbours:
-            zero = self.zero_sides(point, neighbour) if neighbour.short.size else None
-            found = None if zero is None else self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f)
+        for zero in self._beside_short(point):
+            found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f)
             if is_below(found, enough):
                 return found
         return None
+
+    def has_short(self, point) -> bool:
+        """Whether a variable of ``point`` is at its lower bound, so that there are branches for ``without_short``."""
+        return next(self._beside_short(point), None) is not None
+
+    def _beside_short(self, point):
+        sides = (self.zero_sides(point, neighbour) for neighbour in self._c.neighbours if neighbour.short.size)
+        return (zero for zero in sides if zero is not None)
 
     def _widen_from(self, end):
         """Go on without guide bounds from a point below the incumbent that only these keep from descending."""

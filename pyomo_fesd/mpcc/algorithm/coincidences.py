@@ -54,7 +54,7 @@ class Coincidences:
 
     def __init__(self, subsolves, branches):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
-        self._subsolves, self._branches = subsolves, branches
+        self._subsolves, self._branches, self._settled = subsolves, branches, None
 
     def settle(self):
         """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
@@ -64,7 +64,7 @@ class Coincidences:
             self.run.point = replace(before, certificate=replace(before.certificate, grade=Stationarity.OPEN))
             found = self._outcome(before)
             if found is SETTLED:
-                self.run.point = before
+                self.run.point = self._settled = before
             elif found is not OPEN:
                 self._branches.improve_from(found, True)
                 if not self.run.point.certificate.certified:
@@ -72,6 +72,20 @@ class Coincidences:
                     self._branches.try_neighbours()
             if found in (SETTLED, OPEN):
                 return
+
+    def mark_untried(self):
+        """Mark the incumbent as open if it is certified, and has orders that were not tried as a limit came before."""
+        point = self.run.point
+        if point is not None and point.certificate.certified and point is not self._settled and self._may_have_orders(point):
+            self.run.point = replace(point, certificate=replace(point.certificate, grade=Stationarity.OPEN))
+
+    def _may_have_orders(self, point):
+        if not self._c.has_objective or self._is_flat(point):
+            return False
+        sets = self._subsolves.sets(point.w, self._tolerances.biactive)
+        if self._holds_anything(point.w, sets) or self._branches.has_short(point):
+            return True
+        return next(self._orders(point, sets), None) is not None
 
     def checked(self, w, certificate):
         """The certificate of a point that the LPEC has certified, after all orders were tried."""

@@ -76,6 +76,7 @@ class HybridSolver:
             run.outcome = Outcome.INTERRUPTED
         finally:
             self._c.widen()
+        self._coincidences.mark_untried()
         if run.point is None and self._options.mode == 'hybrid':
             run.point = self._feasible_without_branch()
             if run.point is not None and run.outcome is Outcome.INFEASIBLE:

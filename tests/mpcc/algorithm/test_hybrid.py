@@ -8,11 +8,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from problems import small_mpccs
+from problems.surface_at_end import Surface
 from pyomo.mpec import Complementarity, complements
 from scipy.optimize import linprog
 
 import pyomo_fesd
 from pyomo_fesd.mpcc.algorithm.branches import Branches
+from pyomo_fesd.mpcc.algorithm.hybrid import HybridSolver
+from pyomo_fesd.mpcc.algorithm.state import Outcome, Stop
 
 SOLVER = 'mpec_hybrid'
 
@@ -158,3 +161,19 @@ def test_a_warm_start_that_ends_uncertified_is_followed_by_the_homotopy(monkeypa
     # the branch y = 0 ends at the origin, and nothing is tried from there
     assert kinds[:2] == ['branch', 'certificate'] and 'relaxation' in kinds
     assert (model.x.value, model.y.value) == pytest.approx((0, 1), abs=1e-7)
+
+
+def reached_at_the_end():
+    """The best point reaches a surface at the last time."""
+    return Surface(False, -2.0, 1.0, -2.0).build(3, 2, 'LAGRANGE-RADAU')
+
+
+@pytest.mark.parametrize('build, stationarity', [(reached_at_the_end, 'not certified'), (lambda: small_mpccs.bard1()[0], 'B')])
+def test_a_limit_before_all_orders_are_tried_leaves_a_certificate_only_where_there_are_none(monkeypatch, build, stationarity):
+    def stop(self):
+        raise Stop(Outcome.TIME_LIMIT)
+
+    monkeypatch.setattr(HybridSolver, '_settle', stop)
+    results = solve(build())
+    assert results.solver.termination_condition == pyo.TerminationCondition.maxTimeLimit
+    assert results.solver.stationarity == stationarity
