@@ -1,6 +1,6 @@
 """Random MPCCs of eight kinds solved by mpec_hybrid, every claim checked from outside.
 
-    .venv/bin/python docs/benchmarks/random_mpcc/run.py [--count 500] [--fresh] [--limit SECONDS] [--summary]
+    .venv/bin/python docs/benchmarks/random_mpcc/run.py [--count 1000] [--fresh] [--limit SECONDS] [--summary]
 
 Writes rows.csv (every run) and summary.csv (verdicts by kind) beside this file; seeds that have a row are skipped.
 """
@@ -90,7 +90,7 @@ def summarise():
 
 if __name__ == '__main__':
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--count', type=int, default=500)
+    parser.add_argument('--count', type=int, default=1000)
     parser.add_argument('--fresh', action='store_true')
     parser.add_argument('--limit', type=float, default=120.0)
     parser.add_argument('--summary', action='store_true', help="only summary.csv")
