@@ -4,23 +4,26 @@ With the rate cdot of the switching function, and nu the multiplier of the mode 
 
     cdot(nu = 1) > 0 > cdot(nu = 0)
 
-at the first time with c = 0, or in a sliding mode (which then repels).
+at the first time with c = 0, or in a sliding mode (which then repels).  Where several surfaces meet, cdot = r + S nu for all of
+them, and the other multipliers change when one surface is left.  So all choices are counted: a surface is left upwards
+(nu = 1, cdot > 0), downwards (nu = 0, cdot < 0), or kept (0 <= nu <= 1, cdot = 0).
 
 Takes: a solved model with a moving grid.
 Leaves: messages.
-Does not apply: to switching functions that contain algebraic variables, where several surfaces meet, and where the equations do
-not determine the rates by nu alone.
+Does not apply: to switching functions that contain algebraic variables, and where the equations do not determine the rates by nu
+alone.  Where more than MOST surfaces meet, the other multipliers stay as they are, and a message may be a false alarm.
 """
 
 from collections import defaultdict
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint, value
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import ContinuousSet
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import lsqr
 
 from pyomo_fesd.core import (
@@ -37,16 +40,18 @@ from pyomo_fesd.results import SwitchingFunction, largest_value, physical_time
 ZERO, SLIDING = 1e-7, 1e-6
 #: Accuracy of the linear equations, and of a system that counts as solved; a smaller change, relative to the largest, is none.
 EXACT, SOLVED, CHANGES = 1e-10, 1e-6, 1e-9
+#: Largest number of surfaces at one point whose choices are counted.
+MOST = 5
 
 
 def not_unique(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
     """Yield messages for boundaries from which both modes lead away."""
     grid, time, rates = moving_grids(model)[wrt].grid, None, None
+    zeros = {s.name: ZERO * largest_value(s.c) for s in functions}
     for s in functions:
-        for label, slides in _meetings(s, grid, wrt):
+        for label in _meetings(s, zeros[s.name], grid, wrt):
             rates = rates or _Rates(model, wrt)
-            rate, slope, nu = *rates.of(s, label), s.nu[label].value
-            if slope > 0 and (slides or rate + (1 - nu) * slope > 0 > rate - nu * slope):
+            if rates.slope(s, s, label) > 0 and _leaves_choices(rates, s, _others(s, functions, zeros, label), label):
                 time = time or physical_time(model, wrt)
                 yield (
                     f"{s.name}: at time {time[label]:.6g} both modes lead away from their boundary: the solution is "
@@ -55,16 +60,53 @@ def not_unique(model: Block, wrt: ContinuousSet, functions: list[SwitchingFuncti
                 break
 
 
-def _meetings(s, grid, wrt):
-    """``(label, whether it slides)`` where c = 0 and either mode is possible: the first time, and where a slide begins."""
-    first, before, zero = wrt.first(), False, ZERO * largest_value(s.c)
+def _others(s, functions, zeros, label):
+    """The other switching functions that are zero at ``label``."""
+    there = (o for o in functions if o is not s and label in o.c)
+    return [o for o in there if abs(value(o.c[label])) <= zeros[o.name]]
+
+
+def _leaves_choices(rates, s, others, label):
+    """Whether more than one way of leaving and keeping the surfaces of ``s`` and of those coupled with it is possible."""
+    met = _coupled(rates, s, others, label)
+    if len(met) > MOST:
+        return True
+    S = np.array([[rates.slope(row, column, label) for column in met] for row in met])
+    rest = np.array([rates.rate(o, label) for o in met]) - S @ [o.nu[label].value for o in met]
+    return sum(_is_possible(rest, S, ways) for ways in product((0, 1, None), repeat=len(met))) > 1
+
+
+def _coupled(rates, s, others, label):
+    """``s`` and those of the ``others`` whose multipliers change its rate and change by it, directly or through one another."""
+    met, left = [s], list(others)
+    for known in met:
+        near = [o for o in left if rates.slope(known, o, label) and rates.slope(o, known, label)]
+        left = [o for o in left if all(o is not n for n in near)]
+        met.extend(near)
+    return met
+
+
+def _is_possible(rest, S, ways):
+    """Whether rates rest + S nu suit the surfaces that are left downwards (0), upwards (1), and kept (None)."""
+    nu, kept = np.array([way or 0.0 for way in ways]), [i for i, way in enumerate(ways) if way is None]
+    inner = S[np.ix_(kept, kept)]
+    if np.linalg.matrix_rank(inner) < len(kept):
+        return False
+    nu[kept] = np.linalg.solve(inner, -(rest + S @ nu)[kept])
+    leaving = (rest + S @ nu) * [0 if way is None else 2 * way - 1 for way in ways]
+    return all(SLIDING < nu[i] < 1 - SLIDING for i in kept) and all(leaving[i] > 0 for i in range(len(ways)) if i not in kept)
+
+
+def _meetings(s, zero, grid, wrt):
+    """Labels where c = 0 and either mode is possible: the first time, and where a slide begins."""
+    first, before = wrt.first(), False
     if first in s.c and abs(value(s.c[first])) <= zero:
-        yield first, False
+        yield first
     for element in grid.elements:
         label = element.points[0]
         slides = label in s.c and SLIDING < s.nu[label].value < 1 - SLIDING and abs(value(s.c[label])) <= zero
         if slides and not before:
-            yield label, True
+            yield label
         before = slides
 
 
@@ -82,15 +124,23 @@ class _Rates:
             if c.equality and not is_discretisation_equation(c):
                 self._rows[times.time(c)].append(c)
 
-    def of(self, s, label):
-        """Return cdot and d cdot/d nu at ``label``; (0, 0) if they are not determined by states and equations."""
+    def rate(self, s, label):
+        """Return cdot at ``label``, of a switching function of states."""
+        rates, slopes = self._parts(s, label)
+        return sum(g * r.value for g, r in zip(slopes, rates))
+
+    def slope(self, s, other, label):
+        """Return d cdot/d nu at ``label`` for the multiplier of ``other``; 0 if it is not determined by states and equations."""
+        found = self._parts(s, label)
+        slope = None if found is None else self._slope(label, other.nu[label], *found)
+        return 0.0 if slope is None else slope
+
+    def _parts(self, s, label):
+        """The rates of the states in c, and the slopes of c along them; None if there are others than states in it."""
         variables = list(identify_variables(s.c[label], include_fixed=True))
         if not variables or any(v.parent_component() not in self._rates for v in variables):
-            return 0.0, 0.0
-        slopes = gradient(s.c[label], variables)
-        rates = [self._rates[v.parent_component()][v.index()] for v in variables]
-        slope = self._slope(label, s.nu[label], rates, slopes)
-        return (0.0, 0.0) if slope is None else (sum(g * r.value for g, r in zip(slopes, rates)), slope)
+            return None
+        return [self._rates[v.parent_component()][v.index()] for v in variables], gradient(s.c[label], variables)
 
     def _slope(self, label, nu, rates, gradient):
         """sum_j gradient_j d rate_j/d nu by the implicit function theorem; None if the equations do not determine it.
@@ -146,6 +196,14 @@ class _Rates:
 
 
 def _solve(A, b):
-    """A least-norm solution of A x = b; None if there is none."""
+    """A solution of A x = b, of least norm where the largest entry of each row and column is 1; None if there is none."""
+    rows = _inverse(abs(A).max(axis=1))
+    columns = _inverse(abs(diags(rows) @ A).max(axis=0))
+    A, b = diags(rows) @ A @ diags(columns), rows * b
     x = lsqr(A, b, atol=EXACT, btol=EXACT)[0]
-    return x if np.abs(A @ x - b).max(initial=0.0) <= SOLVED * np.abs(b).max(initial=0.0) else None
+    return columns * x if np.abs(A @ x - b).max(initial=0.0) <= SOLVED * np.abs(b).max(initial=0.0) else None
+
+
+def _inverse(largest):
+    found = largest.toarray().ravel()
+    return 1 / np.where(found > 0, found, 1.0)

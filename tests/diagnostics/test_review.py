@@ -107,6 +107,37 @@ def test_each_disjunction_is_looked_at_by_itself():
     assert message.startswith('leaves: ')
 
 
+def two_relays(slopes, x0, scale=1.0):
+    """(x, y)' = slopes (sgn x, sgn y)."""
+    m = over_time(1.5, x=x0[0] * scale, y=x0[1] * scale)
+    m.u, m.v = pyo.Var(m.t, initialize=0), pyo.Var(m.t, initialize=0)
+    m.sgn_x = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 0, m.u[t] == -1], [m.x[t] >= 0, m.u[t] == 1]])
+    m.sgn_y = Disjunction(m.t, rule=lambda m, t: [[m.y[t] <= 0, m.v[t] == -1], [m.y[t] >= 0, m.v[t] == 1]])
+    (a, b), (c, d) = slopes
+    m.ode_x = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == scale * (a * m.u[t] + b * m.v[t]))
+    m.ode_y = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == scale * (c * m.u[t] + d * m.v[t]))
+    return m
+
+
+@pytest.mark.parametrize('scale', [1.0, 1e-3, 1e5])
+@pytest.mark.parametrize(
+    'slopes, said',
+    [
+        # x = 0 repels while y keeps its mode, but y turns round where x leaves
+        (((0.5, 2), (-2, -1)), []),
+        (((0.5, 0), (-2, -1)), ['sgn_x']),
+        # both leave together
+        (((0.5, 2), (2, -1)), ['sgn_x']),
+        (((0.5, 2), (2, 0.5)), ['sgn_x', 'sgn_y']),
+        (((-1, 0.5), (0.5, -1)), []),
+    ],
+)
+def test_where_surfaces_meet_all_ways_of_leaving_are_counted(slopes, said, scale):
+    m = transform(two_relays(slopes, (0, 0), scale), 4, 2)
+    pyomo_fesd.simulate(m)
+    assert [message.partition(':')[0] for message in diagnose(m) if NOT_UNIQUE in message] == said
+
+
 def test_stewarts_form_has_no_switching_functions():
     m = transform(relay(-1, 1, 0.0), 6, 2, form='stewart')
     assert switching_functions(m, m.t) == []
