@@ -1,6 +1,7 @@
 """Post-solve diagnostics that the certificate does not cover."""
 
 import logging
+from functools import cache, partial
 
 from pyomo.core import Block
 
@@ -35,16 +36,17 @@ def diagnose(model: Block) -> list[str]:
     grids = [wrt for wrt, moving in moving_grids(model).items() if _lies_on(moving.block, model)]
     messages = []
     for wrt in grids:
-        messages += [message for name, check in CHECKS.items() for message in _messages(name, check, model, wrt)]
+        functions = cache(partial(switching_functions, model, wrt))
+        messages += [message for name, check in CHECKS.items() for message in _messages(name, check, model, wrt, functions)]
     for message in messages:
         logger.warning(message)
     return messages
 
 
-def _messages(name, check, model, wrt):
+def _messages(name, check, model, wrt, functions):
     """The messages of one check; one line if it fails, since no review may cost a result."""
     try:
-        return list(check(model, wrt, switching_functions(model, wrt)))
+        return list(check(model, wrt, functions()))
     except Exception as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         return [f"{wrt.name}: the solution stands, but it was not reviewed for {name}: {reason}"]
