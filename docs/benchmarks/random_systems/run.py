@@ -78,7 +78,7 @@ def summary(rows):
 def main():
     """Measure the missing rows, write the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--count', type=int, default=204, help="systems")
+    parser.add_argument('--count', type=int, default=1200, help="systems")
     parser.add_argument('--only', default='', help="kinds, by a regular expression")
     parser.add_argument('--methods', nargs='*', choices=METHODS, default=list(METHODS))
     parser.add_argument('--limit', type=float, default=20.0, help="seconds for each run")

@@ -51,7 +51,7 @@ class Completions:
         self._subsolves, self._branches, self.run = subsolves, branches, subsolves.run
         self._form = 'scholtes' if self._options.relaxation == 'auto' else self._options.relaxation
         self._deadline, self._promise, self._possible = setup.deadline.part(SHARE), -np.inf, False
-        self._objectives = []
+        self._objectives, self._around = [], set()
 
     def follow(self, start):
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
@@ -87,9 +87,16 @@ class Completions:
             for eps in AROUND:
                 if self._deadline.expired():
                     return
-                self._round(self.run.point.w, eps)
+                self._round_about(self.run.point.w, eps)
             if not self.run.point.f < before.f - PROGRESS * max(1.0, abs(before.f)):
                 return
+
+    def _round_about(self, w, eps):
+        """A round from ``w``, unless it was run before: it starts cold, and would have the same end."""
+        key = eps, w.tobytes(), self._c.lbx.tobytes()
+        if key not in self._around:
+            self._around.add(key)
+            self._round(w, eps)
 
     def _promising(self):
         """Whether the relaxations promise a much better point than the best one."""

@@ -75,6 +75,15 @@ def test_a_relaxation_with_a_solution_that_is_known_is_not_completed_again():
     assert len(p.kinds('relaxation')) == 2 and len(asked) == 1
 
 
+def test_relaxations_around_a_point_are_not_repeated():
+    # another round of cycles, after the second path, finds no better point
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    rounds._branch_of_completion(p.compiled.x0, 1.0)
+    for _ in range(2):
+        rounds._improve()
+    assert [entry.eps for entry in p.kinds('relaxation')] == pytest.approx(AROUND)
+
+
 def test_no_relaxation_follows_an_infeasible_one(monkeypatch):
     p, rounds, _ = completions(lambda x: (0.3, True))
     relax = p.subsolves.relax
