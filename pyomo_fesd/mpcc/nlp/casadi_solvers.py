@@ -111,7 +111,7 @@ class _CasadiNlp(NlpSolver):
         x, messages = ca.SX.sym('x'), io.StringIO()
         with REDIRECTION, capture_output(messages, capture_fd=True):
             try:
-                settings = {'print_time': False, self.PLUGIN: self._settings({}, options | self.SILENT)}
+                settings = {'print_time': False, self.PLUGIN: self._settings({}, self.SILENT | options)}
                 solver = ca.nlpsol('probe', self.PLUGIN, {'x': x, 'f': (x - 1) ** 2}, settings)
                 solver(x0=0.0)
             except (RuntimeError, ValueError) as error:

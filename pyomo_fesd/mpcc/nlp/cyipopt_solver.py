@@ -157,7 +157,7 @@ def _refusal(options):
     messages = io.StringIO()
     with REDIRECTION, capture_output(messages, capture_fd=True):
         try:
-            for key, value in (options | SILENT).items():
+            for key, value in (SILENT | options).items():
                 problem.add_option(key, value)
         except TypeError as error:
             return f'{messages.getvalue()} {error}'
