@@ -2,7 +2,8 @@
 
 Read first ``errors``, ``time_index``, ``grid`` and ``complementarity``, then the records: ``switched_systems`` (which components
 switch; written before discretisation), ``moving_grid`` with ``boundary_laws`` and ``instants`` (elements of variable length;
-written by ``fesd.finite_elements``; ``held_controls`` reads from it) and ``homotopy_hints`` (for the solver; no time in it).
+written by ``fesd.finite_elements``; ``held_controls`` reads from it) and ``homotopy_hints``, with ``changes`` and ``parts`` (for the
+solver; no time in it).
 ``private_data`` keeps them on blocks, ``generated`` recognises generated blocks, ``keywords`` refuses values outside of their
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
@@ -11,6 +12,7 @@ where something would be, ``withheld_messages`` keeps back the messages of one t
 """
 
 from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
+from pyomo_fesd.core.changes import Arrival, Change, Coincidence, Option, Place, Toggle
 from pyomo_fesd.core.complementarity import Mixed, Pair, distance_to_bound, read_complementarity, read_side
 from pyomo_fesd.core.errors import FesdError
 from pyomo_fesd.core.evaluation import (
@@ -38,18 +40,12 @@ from pyomo_fesd.core.grid import (
 )
 from pyomo_fesd.core.held_controls import held_controls
 from pyomo_fesd.core.homotopy_hints import (
-    Arrival,
     BranchConstraint,
-    Change,
-    Coincidence,
     Filling,
     Follower,
     HomotopyHints,
     NeighbourBranch,
-    Option,
     Penalty,
-    Place,
-    Toggle,
     all_hints,
     homotopy_hints,
 )
