@@ -22,16 +22,16 @@ from typing import Any
 
 from pyomo.contrib.mpc import ScalarData
 from pyomo.contrib.solver.common.factory import SolverFactory
-from pyomo.contrib.solver.common.results import SolutionStatus
 from pyomo.core import Block, Objective, Var
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.control.control_step import BRANCH, CORRECTED, DEADLINE, FULL, PLAN, SIMULATED, ControlStep
+from pyomo_fesd.control.control_step import BRANCH, CORRECTED, FULL, SIMULATED, ControlStep
 from pyomo_fesd.control.held_controls import HeldControls
 from pyomo_fesd.control.moving_interface import MovingModelInterface
 from pyomo_fesd.control.prepared_plan import PreparedPlan
 from pyomo_fesd.control.states import first_states
+from pyomo_fesd.control.step_search import StepSearch
 from pyomo_fesd.core import FesdError, interruptible, is_indexed_by
 from pyomo_fesd.mpcc import Deadline, parameter_data
 
@@ -40,8 +40,6 @@ from pyomo_fesd.mpcc import Deadline, parameter_data
 ATTEMPTS = ({'warm_start': 'only'}, BRANCH), ({'simulate_first': True}, SIMULATED)
 #: One more attempt of a thorough step.
 HOMOTOPY = ({'simulate_first': False}, FULL)
-#: Seconds left without which no further attempt begins.
-LEAST = 1e-3
 
 
 class Controller:
@@ -185,8 +183,8 @@ class Controller:
         return ControlStep(self.present_controls(), CORRECTED, False, reason, objective, seconds), ''
 
     def _searched(self, deadline, thorough):
-        """The ``_Search`` of one step."""
-        search = _Search(self, deadline)
+        """The ``StepSearch`` of one step."""
+        search = StepSearch(self, deadline)
         search.run(ATTEMPTS if self._has_plan else ATTEMPTS[1:], thorough)
         if self._held is not None and not deadline.expired():
             self._search_from_held(search, deadline)
@@ -239,68 +237,6 @@ class Controller:
         """Give all variables their values of before."""
         for v, number in zip(self._variables, values):
             v.set_value(number, skip_validation=True)
-
-
-class _Search:
-    """The attempts of one step.
-
-    Attributes
-    ----------
-    best : Results or None
-        of the best feasible point
-    """
-
-    def __init__(self, controller, deadline):
-        self._controller, self._deadline = controller, deadline
-        self._plan, self._results, self._late = controller.values(), [], False
-        self.best, self._values, self._origin = None, self._plan, PLAN
-
-    def run(self, attempts, all_of_them):
-        """Make attempts until one is certified, or all; the model has the values of the best one, or those of the plan."""
-        for options, origin in attempts:
-            left = self._deadline.left()
-            if left is not None and left < LEAST:
-                self._late = True
-                break
-            results = self._controller.solve(options, left)
-            self._results.append(results)
-            if self._improves(results):
-                self.best, self._values, self._origin = results, self._controller.values(), _origin(results, origin)
-            if results.solution_status is SolutionStatus.optimal and not all_of_them:
-                return
-            self._controller.load(self._values)
-        self._controller.load(self._values)
-
-    def _improves(self, results):
-        """Whether this is the first feasible point, or better than the one before: certified before uncertified."""
-        if results.solution_status not in (SolutionStatus.optimal, SolutionStatus.feasible):
-            return False
-        return self.best is None or self._rank(results) < self._rank(self.best)
-
-    def _rank(self, results):
-        sense = self._controller.sense
-        return results.solution_status is not SolutionStatus.optimal, sense * results.incumbent_objective
-
-    def answer(self, began, controls, refused) -> ControlStep:
-        """The best point as a ``ControlStep``; ``refused`` says why a prepared plan was not corrected."""
-        certified = self.best is not None and self.best.solution_status is SolutionStatus.optimal
-        origin = DEADLINE if self.best is not None and not certified and self._deadline.expired() else self._origin
-        objective = None if self.best is None else self.best.incumbent_objective
-        seconds = time.perf_counter() - began
-        reason = '; '.join(filter(None, (self._reason(), refused and f"not corrected: {refused}")))
-        return ControlStep(controls, origin, certified, reason, objective, seconds, self._results)
-
-    def _reason(self):
-        if self.best is not None:
-            return self.best.extra_info.reason
-        found = [f"{r.extra_info.outcome}: {r.extra_info.reason}" for r in self._results[-1:]]
-        late = ["no time was left"] if self._late else []
-        return "the plan before goes on; " + '; '.join([*found, *late])
-
-
-def _origin(results, origin):
-    """Where a feasible point comes from; relaxations belong to the full run."""
-    return FULL if any(step.kind in ('relaxation', 'restoration') for step in results.extra_info.steps) else origin
 
 
 def _checked(controls, wrt):

@@ -2,8 +2,8 @@
 
 Read first ``errors``, ``time_index``, ``grid`` and ``complementarity``, then the records: ``switched_systems`` (which components
 switch; written before discretisation), ``moving_grid`` with ``boundary_laws`` and ``instants`` (elements of variable length;
-written by ``fesd.finite_elements``; ``held_controls`` reads from it) and ``homotopy_hints``, with ``changes`` and ``parts`` (for the
-solver; no time in it).
+written by ``fesd.finite_elements``; ``held_controls`` reads from it) and ``homotopy_hints``, with ``changes`` and ``parts`` (for
+the solver; no time in it).
 ``private_data`` keeps them on blocks, ``generated`` recognises generated blocks, ``keywords`` refuses values outside of their
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
