@@ -9,8 +9,8 @@ With Z the side of every condition that is zero in the element and P the other o
 * One becomes negative inside: it arrives at zero.  The same system with r free and P(1) = 0 (or the event function) gives the
   element that ends there, P(1) by the polynomial through the collocation points where P jumps (theory, eq. 13a).
 * One is negative from the beginning, or has just arrived at zero: P is a zero side from here on.  If that is all, it slides (or a
-  nonsmooth point is passed); if one side of another condition of the same component becomes zero too, the other mode begins.  All
-  these active sets are tried; exactly one must be consistent.
+  nonsmooth point is passed); if one side of another condition of the same switching system becomes zero too, the other mode
+  begins.  All these active sets are tried; exactly one must be consistent.
 
 Does not apply: where Newton's method does not converge, the system is singular, a bound of another variable is violated, or not
 exactly one active set is consistent.  Then the answer is None, and the MPCC decides.
@@ -162,9 +162,9 @@ class ActiveSetStepper:
 
     @cached_property
     def _siblings(self):
-        """For each condition the others of the same component."""
-        components = [name.rpartition('[')[0] or name for name in self.names]
-        return [[i for i, other in enumerate(components) if other == own and i != j] for j, own in enumerate(components)]
+        """For each condition the others of the same system, in which the last index counts; without any those of the component."""
+        of_system, of_component = (_alike([place(name) for name in self.names]) for place in (_system_of, _component_of))
+        return [near or others for near, others in zip(of_system, of_component)]
 
     def _system(self, active, event=None):
         key = active.tobytes(), event
@@ -238,6 +238,20 @@ class ActiveSetStepper:
             end[~self._f.continuous], end[event] = np.nan, 0.0
         G, H = self._signs.sums(values)
         return ActiveSetStep(w, length, active, end, (G > H + TINY).tobytes(), event)
+
+
+def _component_of(name: str) -> str:
+    return name.rpartition('[')[0] or name
+
+
+def _system_of(name: str) -> str:
+    component, _, index = name.rpartition('[')
+    return f"{component}[{index.rpartition(',')[0]}" if component else name
+
+
+def _alike(places: list[str]) -> list[list[int]]:
+    """For each of the ``places`` the numbers of the others that are equal."""
+    return [[i for i, other in enumerate(places) if other == own and i != j] for j, own in enumerate(places)]
 
 
 def _with_zero(active: np.ndarray, functions: Iterable[int]) -> np.ndarray:

@@ -210,6 +210,24 @@ def chain(number, nfe):
     return move(m, nfe, 2)
 
 
+@pytest.mark.parametrize('form', ['heaviside', 'stewart'])
+def test_the_other_mode_of_one_of_many_systems(form):
+    # levels reach 0 at k/12, the seventh with the eighth, and rise half as fast above it
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 1.25))
+    m.k = pyo.RangeSet(12)
+    arrivals = {k: (8 if k == 7 else k) / 12 for k in m.k}
+    m.x = pyo.Var(m.k, m.t, initialize=lambda m, k, t: -arrivals[k])
+    m.dx = dae.DerivativeVar(m.x, wrt=m.t)
+    for k in m.k:
+        m.x[k, 0].fix()
+    m.weir = Disjunction(m.k, m.t, rule=lambda m, k, t: [[m.x[k, t] <= 0, m.dx[k, t] == 1], [m.x[k, t] >= 0, m.dx[k, t] == 0.5]])
+    m, timer = simulated(transform(m, 24, 2, form=form))
+    assert calls(timer, 'mpcc') == 0
+    assert sorted({round(s.time, 9) for s in pyomo_fesd.switches(m)}) == pytest.approx(sorted(set(arrivals.values())), abs=1e-8)
+    assert [m.x[k, 1.25].value for k in m.k] == pytest.approx([(1.25 - arrivals[k]) / 2 for k in m.k], abs=1e-8)
+
+
 @pytest.mark.parametrize('dense', [True, False])
 def test_dense_and_sparse_factors_find_the_same(dense, monkeypatch):
     monkeypatch.setattr(newton, 'DENSE', 10**6 if dense else 0)
