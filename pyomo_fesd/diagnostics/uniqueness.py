@@ -6,7 +6,7 @@ With the rate cdot of the switching function, and nu the multiplier of the mode 
 
 at the first time with c = 0, or in a sliding mode (which then repels).  Where several surfaces meet, cdot = r + S nu for all of
 them, and the other multipliers change when one surface is left.  So all choices are counted: a surface is left upwards
-(nu = 1, cdot > 0), downwards (nu = 0, cdot < 0), or kept (0 <= nu <= 1, cdot = 0).
+(nu = 1, cdot > 0), downwards (nu = 0, cdot < 0), or kept (0 < nu < 1, cdot = 0).
 
 Takes: a solved model with a moving grid.
 Leaves: messages.
@@ -47,9 +47,10 @@ MOST = 5
 def not_unique(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
     """Yield messages for boundaries from which both modes lead away."""
     grid, time, rates = moving_grids(model)[wrt].grid, None, None
-    zeros = {s.name: ZERO * largest_value(s.c) for s in functions}
+    # those of one Disjunction have the same name
+    zeros = {id(s): ZERO * largest_value(s.c) for s in functions}
     for s in functions:
-        for label in _meetings(s, zeros[s.name], grid, wrt):
+        for label in _meetings(s, zeros[id(s)], grid, wrt):
             rates = rates or _Rates(model, wrt)
             if rates.slope(s, s, label) > 0 and _leaves_choices(rates, s, _others(s, functions, zeros, label), label):
                 time = time or physical_time(model, wrt)
@@ -63,7 +64,7 @@ def not_unique(model: Block, wrt: ContinuousSet, functions: list[SwitchingFuncti
 def _others(s, functions, zeros, label):
     """The other switching functions that are zero at ``label``."""
     there = (o for o in functions if o is not s and label in o.c)
-    return [o for o in there if abs(value(o.c[label])) <= zeros[o.name]]
+    return [o for o in there if abs(value(o.c[label])) <= zeros[id(o)]]
 
 
 def _leaves_choices(rates, s, others, label):
