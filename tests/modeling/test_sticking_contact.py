@@ -42,9 +42,10 @@ def test_the_largest_push_is_that_of_the_cone():
     assert m.v[1].value == pytest.approx(0, abs=1e-8) and m.s[1].value == pytest.approx(0, abs=1e-8)
 
 
+@pytest.mark.parametrize('cross', ['element', 'full'])
 @pytest.mark.parametrize('push, found', [(4.9, True), (5.1, False)])
-def test_a_push_beyond_the_cone_is_infeasible(push, found):
-    m = move(block(push=push), 2, 2)
+def test_a_push_beyond_the_cone_is_infeasible(push, found, cross):
+    m = move(block(push=push), 2, 2, cross_complementarity=cross)
     results = solved(m)
     assert (results.termination_condition == 'optimal') == found
     if not found:

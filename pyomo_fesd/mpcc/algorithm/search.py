@@ -1,9 +1,11 @@
 """Depth-first search over the pairs, for problems whose feasible branches neither Reg(eps) nor the LPEC finds.
 
 A node fixes one side of some pairs to zero and only requires G, H >= 0 of the others.  A solution that violates no pair names a
-branch; otherwise the node is split on the pair that it violates most, the side that is nearer to zero first.  A node for which
-no feasible point is found, from its parent's solution or from the start, is not followed: where the NLPs are convex, an
-exhausted search proves that there is no feasible branch.
+branch; otherwise the node is split on the larger side of the pair that it violates most: either it is positive, and what it is
+paired with is zero, or it is zero itself.  Where sides are in one pair each, these are the two sides of the pair; where they are
+in several (eq. 11c), both children decide more than this pair.  A node for which no feasible point is found, from its parent's
+solution or from the start, is not followed: where the NLPs are convex, an exhausted search proves that there is no feasible
+branch.
 
 Source: Bard, Moore, SIAM J. Sci. Stat. Comput. 11 (1990) 281.
 """
@@ -54,10 +56,17 @@ def leaves(compiled, branch, w, tolerance):
             yield solved.w, np.where(zero == FREE, nearer, zero)
             continue
         k = int(np.argmax(violation))
-        for side in (1 - nearer[k], nearer[k]):
-            child = zero.copy()
-            child[k] = side
-            stack.append((solved.w, child))
+        positive, itself = _children(compiled, zero, k, 1 - nearer[k])
+        stack += [(solved.w, itself), (solved.w, positive)]
+
+
+def _children(compiled, zero, k, larger):
+    """The two decisions on side ``larger`` of pair k: it is positive, so that its partners are zero; it is zero itself."""
+    sides = compiled.side_of.reshape(2, -1)
+    as_G, as_H = (zero == FREE) & (sides == sides[larger, k])
+    positive = np.where(as_G, H_ZERO, np.where(as_H, G_ZERO, zero))
+    itself = np.where(as_G, G_ZERO, np.where(as_H, H_ZERO, zero))
+    return positive, itself
 
 
 class Verdict(Enum):
@@ -95,7 +104,8 @@ def exhaust(compiled, node, w) -> Verdict:
             return Verdict.FOUND
         at = compiled.evaluate(solved.w)
         k = int(np.argmax(np.where(zero == FREE, np.minimum(at.G, at.H), -np.inf)))
-        stack += [(solved.w, np.where(np.arange(q) == k, side, zero)) for side in (G_ZERO, H_ZERO)]
+        positive, itself = _children(compiled, zero, k, int(at.G[k] <= at.H[k]))
+        stack += [(solved.w, positive), (solved.w, itself)]
     return Verdict.NONE
 
 

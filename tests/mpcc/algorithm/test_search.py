@@ -116,6 +116,24 @@ def test_it_solves_no_more_nodes_than_it_may(monkeypatch, limit):
     assert distinct(nodes) == limit
 
 
+def doubled(wrong):
+    """A lock in which each x_i is in two pairs, as in eq. (11c)."""
+    m = lock(wrong)
+    m.z = pyo.Var(m.x.index_set(), bounds=(0, None), initialize=0.5)
+    m.same = pyo.Constraint(m.z.index_set(), rule=lambda m, i: m.z[i] == m.y[i])
+    m.both = Complementarity(m.z.index_set(), rule=lambda m, i: complements(m.x[i] >= 0, m.z[i] >= 0))
+    return m
+
+
+def test_pairs_with_a_common_side_need_no_more_nodes():
+    single, double = [], []
+    for m, nodes in ((lock(wrong=0.5), single), (doubled(wrong=0.5), double)):
+        assert found(parts(m), nodes) == []
+    assert distinct(double) <= distinct(single)
+    n = len(ANSWER)
+    assert all(np.array_equal(zero[:n], zero[n:]) for zero in double)
+
+
 def test_a_node_has_its_own_limit_of_iterations(monkeypatch):
     monkeypatch.setattr(search, 'ITERATIONS', 1)
     p = parts(lock())
