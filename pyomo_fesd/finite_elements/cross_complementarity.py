@@ -23,8 +23,9 @@ FORMS = {'element': 0, 'point': 1, 'full': 2}
 
 
 def add_cross_complementarity(moving: MovingGrid, conditions: list[TimeComplementarity], form: str) -> None:
-    """Add the aggregated pairs and deactivate their sources."""
+    """Add the aggregated pairs in one of ``FORMS``, or 'auto', and deactivate their sources."""
     block, grid = moving.block, moving.grid
+    form = _chosen(moving) if form == 'auto' else form
     moving.complementarities = list(conditions)
     block.condition = Set(initialize=[c.name for c in conditions], ordered=True)
     points = RangeSet(len(grid.tau) + 2)  # the collocation points, and both boundaries of a continuous side
@@ -42,6 +43,12 @@ def add_cross_complementarity(moving: MovingGrid, conditions: list[TimeComplemen
         for t, source in condition.conditions.items():
             if t != moving.wrt.first():
                 source.deactivate()
+
+
+def _chosen(moving):
+    """The form for a model: with contacts that must not slip, relaxations of sums lead to worse minima."""
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    return 'full' if impacts is not None and any(law.sticking for law in impacts.laws) else 'element'
 
 
 def _lead_first_time(moving, form):

@@ -80,7 +80,11 @@ OPTIONS = {
         In(['LAGRANGE-RADAU', 'LAGRANGE-LEGENDRE']),
         "'LAGRANGE-RADAU' (order 2K-1, L-stable) or 'LAGRANGE-LEGENDRE' (order 2K)",
     ),
-    'cross_complementarity': ('element', In(list(FORMS)), "'element' (eq. 11a), 'point' (11b) or 'full' (11c)"),
+    'cross_complementarity': (
+        'auto',
+        In(['auto', *FORMS]),
+        "'element' (eq. 11a), 'point' (11b) or 'full' (11c); 'auto' is 'full' with contacts that must not slip, else 'element'",
+    ),
     'equilibration': (
         'two_stage',
         In(list(MODES)),

@@ -201,7 +201,7 @@ def test_of_several_switching_functions_only_those_with_a_held_control_jump_at_s
         assert labels_of(read_complementarity(pair).H, p) == expected
 
 
-@pytest.mark.parametrize('cross, pairs', [('element', 1), ('point', 3), ('full', 3 * 4)])
+@pytest.mark.parametrize('cross, pairs', [('auto', 1), ('element', 1), ('point', 3), ('full', 3 * 4)])
 def test_pairs_an_element_with_radau(cross, pairs):
     m = transform(signum.build(), 5, 3, cross_complementarity=cross)
     assert len(block(m).cross) == 2 * 5 * pairs

@@ -75,6 +75,15 @@ def test_the_slip_may_change_its_sign_in_flight_within_an_element():
     assert m.v[1].value == pytest.approx(-1, abs=1e-8)
 
 
+def test_each_two_points_of_an_element_are_a_pair():
+    pairs = {cross: len(moving_grids(m)[m.t].pairs) for cross in ('auto', 'element', 'full') for m in [pushed(cross)]}
+    assert pairs['auto'] == pairs['full'] > pairs['element']
+
+
+def pushed(cross):
+    return move(block(push=0.0), 2, 2, cross_complementarity=cross)
+
+
 def test_it_cannot_be_simulated():
     m = move(block(push=0.0), 2, 2)
     with pytest.raises(FesdError, match=r'table: simulate: its bodies must not slip \(sticks=True\)'):

@@ -226,20 +226,24 @@ class InsertedPart:
         return self._least_step(A.toarray(), residual, w, free) if step is None else (step, True)
 
     def _least_step(self, A, residual, w, free):
-        at_bound = np.zeros(len(free), dtype=bool)
-        gates, low = self._gates[free], self._c.lbx[free]
-        for _ in range(1 + np.count_nonzero(gates)):
-            inner = ~at_bound
-            step = np.where(at_bound, low - w[free], 0.0)
+        """The step of least length in which gates, and what the equations leave undetermined, stay within their bounds."""
+        gates, low, high = self._gates[free], self._c.lbx[free], self._c.ubx[free]
+        bound, determined = np.full(len(free), np.nan), True
+        for _ in range(1 + len(free)):
+            inner = np.isnan(bound)
+            step = np.where(inner, 0.0, bound - w[free])
             U, s, Vt = np.linalg.svd(A[:, inner]) if inner.any() and len(A) else (np.eye(len(A)), np.zeros(0), np.eye(inner.sum()))
             rank = int(np.count_nonzero(s > SINGULAR * s.max(initial=0.0)))
-            target = -residual - A[:, at_bound] @ step[at_bound]
+            target = -residual - A[:, ~inner] @ step[~inner]
             step[inner] = Vt[:rank].T @ ((U[:, :rank].T @ target) / s[:rank])
-            below = gates & inner & (w[free] + step < low - EXACT)
-            if not below.any():
-                undetermined = np.abs(Vt[rank:]).max(axis=0, initial=0.0)
-                return step, not np.any(undetermined[~gates[inner]] > UNDETERMINED)
-            at_bound |= below
+            loose = np.zeros(len(free), dtype=bool)
+            loose[inner] = np.abs(Vt[rank:]).max(axis=0, initial=0.0) > UNDETERMINED
+            determined &= not np.any(loose & ~gates)
+            reached = w[free] + step
+            below, above = (gates & inner | loose) & (reached < low - EXACT), loose & (reached > high + EXACT)
+            if not (below | above).any():
+                return step, determined
+            bound[below], bound[above] = low[below], high[above]
         return step, False
 
 

@@ -4,7 +4,14 @@ import numpy as np
 import pyomo.environ as pyo
 import pytest
 from problems import inserted
+from problems.running import move, solve
+from problems.states import over_time
+from pyomo.common.timing import HierarchicalTimer
 
+import pyomo_fesd
+from pyomo_fesd.mpcc.compile.compile import compile_mpcc
+from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc
+from pyomo_fesd.mpcc.subproblems import Parts, sort_sides
 from pyomo_fesd.mpcc.subproblems.active_set import active_sets
 from pyomo_fesd.mpcc.subproblems.inserted_part import InsertedPart
 
@@ -55,3 +62,30 @@ def test_active_sets_of_the_simulation_are_clear():
     s = inserted.simulated(5, 'stewart')
     at = s.c.evaluate(s.w)
     assert not active_sets(at.G, at.H, 1e-7).gamma[s.parts.of_pair == 1].any()
+
+
+def in_flight():
+    """A block above a table: its slip goes from 1 to -1, and is the difference of two parts >= 0 of which nothing says their sum."""
+    m = over_time(1.0, y=10.0, v=1.0, w=0.0)
+    m.table = pyomo_fesd.contact(m.t, gap=lambda m, t: m.y[t], friction=0.5, slip=lambda m, t: m.v[t], sticks=True)
+    m.across = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == m.w[t])
+    m.slide = pyo.Constraint(m.t, rule=lambda m, t: m.dv[t] == -2 + m.table[t].friction)
+    m.press = pyo.Constraint(m.t, rule=lambda m, t: m.dw[t] == -10 + m.table[t].normal)
+    return solve(move(m, 2, 2))
+
+
+@pytest.mark.parametrize('k', [0, 1])
+def test_values_that_nothing_determines_stay_within_their_bounds(k):
+    c = compile_mpcc(read_mpcc(in_flight()), HierarchicalTimer())
+    parts, at = Parts(c), c.evaluate(c.x0)
+    rows, own = np.flatnonzero(parts.of_row == k), parts.all[k].own
+    inner = np.setdiff1d(own, [parts.all[k].extent])
+    part = InsertedPart(c, sort_sides(c), parts, inner, rows, active_sets(at.G, at.H, 1e-7).zero)
+    slips = {j for j in inner if c.variables[j].name.endswith(('.p', '.n'))}
+    start = c.x0.copy()
+    start[list(slips)] = 0.0
+    found = part.solve(start, any_of=True)
+    assert len(slips) >= 4 and not part.determined
+    assert np.all(found[inner] >= c.lbx[inner] - 1e-9)
+    assert part.missed(found) <= 1e-8
+    assert part.solve(start) is None
