@@ -65,7 +65,7 @@ def test_active_sets_of_the_simulation_are_clear():
 
 
 def in_flight():
-    """A block above a table: its slip goes from 1 to -1, and is the difference of two parts >= 0 of which nothing says their sum."""
+    """A block above a table: its slip goes from 1 to -1, the difference of two parts >= 0 of which nothing says the sum."""
     m = over_time(1.0, y=10.0, v=1.0, w=0.0)
     m.table = pyomo_fesd.contact(m.t, gap=lambda m, t: m.y[t], friction=0.5, slip=lambda m, t: m.v[t], sticks=True)
     m.across = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == m.w[t])
