@@ -22,10 +22,7 @@ from pyomo_fesd.dcs.source_maps import source_maps
 
 def dcs_block(parent: BlockData) -> BlockData:
     """Return the block on ``parent`` for everything generated beside its components."""
-    name = GENERATED + 'dcs'
-    if parent.component(name) is None:
-        parent.add_component(name, Block())
-    return parent.component(name)
+    return _below(parent, GENERATED + 'dcs')
 
 
 def blend(system, form, defined) -> Callable:
@@ -66,12 +63,11 @@ def blend(system, form, defined) -> Callable:
 
 def _form_block(system, form):
     """The block for one form of one Disjunction; made at its first time."""
-    component, parent = system.disjunction.parent_component(), dcs_block(system.disjunction.parent_block())
-    name = component.local_name + _suffix(system, form)
-    block = parent.component(name)
-    if block is None:
-        block = Block()
-        parent.add_component(name, block)
+    block = _below(dcs_block(system.disjunction.parent_block()), system.disjunction.parent_component().local_name)
+    kind = _kind(system, form)
+    if kind:
+        block = _below(block, GENERATED + kind)
+    if block.component('mode') is None:
         sets = _index_sets(system)
         if form is not None:
             form.declare(block, sets, form.size(system))
@@ -82,12 +78,19 @@ def _form_block(system, form):
     return block
 
 
-def _suffix(system, form):
-    """The end of a block's name; the smallest form has the name of its Disjunction."""
+def _below(parent, name):
+    """The block ``name`` of ``parent``; made where there is none."""
+    if parent.component(name) is None:
+        parent.add_component(name, Block())
+    return parent.component(name)
+
+
+def _kind(system, form):
+    """What form and size a block has; empty for the smallest form, whose block is that of its Disjunction."""
     if form is None:
-        return '_single_mode'
+        return 'single_mode'
     size = form.size(system)
-    return '' if form is heaviside and size == 1 else f'_{form.NAME}_{size}'
+    return '' if form is heaviside and size == 1 else f'{form.NAME}_{size}'
 
 
 def _index_sets(system):

@@ -9,6 +9,7 @@ from pyomo.gdp import Disjunction
 
 from pyomo_fesd import FesdError
 from tests.problems import laws
+from tests.problems.forms_of import form_block
 
 
 @pytest.mark.parametrize('form', ['heaviside', 'stewart', 'hysteresis'])
@@ -76,7 +77,7 @@ def test_a_continued_law_is_the_users_law_inside_and_has_a_value_outside(name, f
         rule=lambda m, t: [[m.x[t] >= crest, m.dx[t] == LAWS[name](factor * (m.x[t] - crest))], [m.x[t] <= crest, m.dx[t] == 0]],
     )
     pyo.TransformationFactory('fesd.dcs').apply_to(m, form=form)
-    block = m.component('_pyomo_fesd_dcs').component('mode' if form == 'heaviside' else 'mode_stewart_2')
+    _, block = form_block(m)
     # the start values of all variables fit the equations of the laws
     for con in block.law_equation.values():
         assert pyo.value(con.body) == pytest.approx(pyo.value(con.upper), abs=1e-9)

@@ -35,6 +35,7 @@ from tests.models import (
     units,
     values_of_generated,
 )
+from tests.problems.forms_of import form_block
 
 fesd_dcs = pyo.TransformationFactory('fesd.dcs')
 
@@ -249,8 +250,8 @@ def test_the_target_is_remembered_when_time_gets_its_points():
 
 def test_the_form_is_remembered_when_time_gets_its_points():
     m = finite_elements(dcs(signum(), form='stewart'), nfe=2, ncp=2)
-    assert list(m._pyomo_fesd_dcs.component_map()) == ['sgn_stewart_2']
-    assert len(m._pyomo_fesd_dcs.sgn_stewart_2.mu) == len(m.t)
+    name, block = form_block(m)
+    assert name == 'stewart_2' and len(block.mu) == len(m.t)
 
 
 def test_two_disjunctions_are_independent_systems():
@@ -301,7 +302,7 @@ def test_switching_one_of_three_modes_off_leaves_the_small_form():
     for t in m.t:
         m.sgn[t].disjuncts[2].indicator_var.fix(False)
     dcs(m)
-    assert list(m._pyomo_fesd_dcs.component_map()) == ['sgn']
+    assert form_block(m)[0] == ''
     assert len(active(m, Complementarity)) == 2 * len(m.t)
 
 

@@ -15,6 +15,7 @@ from pyomo_fesd.core.complementarity import read_complementarity
 from pyomo_fesd.core.time_index import TimeIndex
 from tests.models import dcs
 from tests.problems import relay_of_states, setpoint, sliding, weir
+from tests.problems.forms_of import form_block
 from tests.problems.running import EXACT_SCHEMES, LEGENDRE, RADAU, SCHEMES, move, run, solve, transform
 
 FORMS = ('element', 'point', 'full')
@@ -195,9 +196,9 @@ def test_of_several_switching_functions_only_those_with_a_held_control_jump_at_s
         ],
     )
     transform(m, 4, 1, form='heaviside', piecewise_constant=[m.u])
-    p = m.component('_pyomo_fesd_dcs').regulator_heaviside_2.p
+    p = form_block(m)[1].p
     for function, expected in ((1, [(1, 1), (1.5, 1)]), (2, [(1.5, 2)])):
-        pair = block(m).cross[f'regulator_heaviside_2.complementarity[{function},2]', 3]
+        pair = block(m).cross[f'regulator.complementarity[{function},2]', 3]
         assert labels_of(read_complementarity(pair).H, p) == expected
 
 

@@ -34,6 +34,7 @@ from tests.models import (
     violation,
     weights,
 )
+from tests.problems.forms_of import form_block
 from tests.problems.running import LEGENDRE, RADAU, move, seen, solve
 
 
@@ -47,25 +48,20 @@ def three_sectors():
     )
 
 
-def name_of_form(m):
-    (name,) = m._pyomo_fesd_dcs.component_map()
-    return name
-
-
 # Which form
 
 
 @pytest.mark.parametrize(
     'build, name',
     [
-        (signum, 'sgn'),
-        (thresholds, 'level_heaviside_2'),
-        (quadrants, 'corner_heaviside_2'),
-        (three_sectors, 'sgn_stewart_6'),
+        (signum, ''),
+        (thresholds, 'heaviside_2'),
+        (quadrants, 'heaviside_2'),
+        (three_sectors, 'stewart_6'),
     ],
 )
 def test_auto_takes_the_smallest_form_that_fits(build, name):
-    assert name_of_form(dcs(build())) == name
+    assert form_block(dcs(build()))[0] == name
 
 
 def test_of_two_forms_of_the_same_size_auto_takes_stewarts():
@@ -74,16 +70,17 @@ def test_of_two_forms_of_the_same_size_auto_takes_stewarts():
     limits = (0, 1, 2)
     inner = [lambda m, t, a=a: [pyo.inequality(a, m.x[t], a + 1), m.dx[t] == a] for a in limits[:-1]]
     add_modes(m, lambda m, t: [m.x[t] <= 0, m.dx[t] == 5], *inner, lambda m, t: [m.x[t] >= 2, m.dx[t] == 4])
-    assert name_of_form(dcs(m)) == 'sgn_stewart_4'
+    assert form_block(dcs(m))[0] == 'stewart_4'
 
 
 @pytest.mark.parametrize('build', [thresholds, quadrants])
 @pytest.mark.parametrize('form', ['stewart', 'heaviside'])
 def test_a_form_counts_what_it_writes(build, form):
     m = dcs(build(), form=form)
-    modes = len(m._pyomo_fesd_dcs.component(name_of_form(m)).mode)
+    name, block = form_block(m)
+    modes = len(block.mode)
     written = sum(len(generated(m, ctype)) for ctype in (pyo.Var, pyo.Constraint, Complementarity)) - modes
-    number = int(name_of_form(m).split('_')[-1])
+    number = int(name.split('_')[-1])
     assert written == {'stewart': 4 * number + 2, 'heaviside': 6 * number}[form] * len(m.t)
 
 
@@ -109,7 +106,7 @@ def test_a_sector_that_can_take_in_what_is_touched_at_the_corner_does():
         return write
 
     add_modes(m, *(mode(i) for i in range(6)))
-    assert name_of_form(dcs(m)) == 'sgn_heaviside_3'
+    assert form_block(dcs(m))[0] == 'heaviside_3'
     m.x[0].value, m.y[0].value = 0.0, 0.0
     for number in range(1, 9):
         put_on(m.sgn[0], number)
@@ -136,7 +133,7 @@ def test_a_function_that_does_not_matter_costs_nothing():
     m = scalar_ode()
     add_modes(m, lambda m, t: [m.x[t] <= 0, m.x[t] <= 5, m.dx[t] == 3], lambda m, t: [m.x[t] >= 0, m.dx[t] == 1])
     dcs(m)
-    assert name_of_form(m) == 'sgn'
+    assert form_block(m)[0] == ''
     m.x[0].value = 1.0
     assert modes_on(m.sgn[0]) == [m.sgn[0].disjuncts[1]]
 
@@ -173,7 +170,7 @@ def test_on_a_threshold_only_its_two_neighbours_can_be_on():
 
 def test_two_modes_can_be_written_with_a_step_variable_on_request():
     m = dcs(signum(), form='heaviside')
-    assert name_of_form(m) == 'sgn'
+    assert form_block(m)[0] == ''
     for x, on, dx in ((-2.0, m.below[0], 3), (1.5, m.above[0], 1)):
         m.x[0].value = x
         assert modes_on(m.sgn[0]) == [on]

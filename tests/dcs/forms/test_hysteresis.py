@@ -11,6 +11,7 @@ from pyomo_fesd import FesdError
 from pyomo_fesd.core import all_switched_systems
 from tests.models import collocate, dcs, generated, scalar_ode, signum, snapshot, solution
 from tests.problems import burst_disc, gears, thermostats
+from tests.problems.forms_of import form_block
 from tests.problems.running import seen
 
 
@@ -21,13 +22,13 @@ def remembered(m, *names):
 
 def form(m, name='relay', modes=2):
     """The generated block of a Disjunction."""
-    return m._pyomo_fesd_dcs.component(f'{name}_hysteresis_{modes}')
+    return m._pyomo_fesd_dcs.component(name).component(f'_pyomo_fesd_hysteresis_{modes}')
 
 
 def conditions(m):
     """The recorded conditions by name of their weight, as strings."""
     found = all_switched_systems(m).hysteresis
-    return {mode.weight.name.split('.', 2)[-1]: [str(c.expr) for c in mode.conditions] for mode in found}
+    return {mode.weight.name.split('.', 3)[-1]: [str(c.expr) for c in mode.conditions] for mode in found}
 
 
 # What is left
@@ -155,7 +156,7 @@ def test_data_a_component_or_a_block_may_be_named(name):
     m.b.d = Disjunction(m.t, rule=lambda b, t: [[m.x[t] <= 1, m.dx[t] == 1], [m.x[t] >= 0, m.dx[t] == -1]])
     named = {'index': list(m.b.d.values()), 'component': m.b.d, 'block': m.b}[name]
     dcs(m, hysteresis=named)
-    assert len(m.b._pyomo_fesd_dcs.d_hysteresis_2.nu) == len(m.t)
+    assert len(m.b._pyomo_fesd_dcs.d._pyomo_fesd_hysteresis_2.nu) == len(m.t)
 
 
 def test_without_memory_overlapping_regions_are_refused_and_the_message_names_it():
@@ -184,7 +185,7 @@ def test_indexed_disjunctions_have_a_weight_for_each_index():
 def test_disjunctions_in_blocks_over_time():
     m = dcs(thermostats.build_in_blocks(), hysteresis=None) if False else thermostats.build_in_blocks()
     dcs(m, hysteresis=[m])
-    assert m.hyb[0]._pyomo_fesd_dcs.relay_hysteresis_2.nu[1].value == 1
+    assert m.hyb[0]._pyomo_fesd_dcs.relay._pyomo_fesd_hysteresis_2.nu[1].value == 1
 
 
 # Modes that are switched off
@@ -201,7 +202,7 @@ def test_an_only_mode_simply_holds():
     m = thermostat.build()
     m.cooling.deactivate()
     remembered(m, 'relay')
-    block = m._pyomo_fesd_dcs.relay_single_mode
+    _, block = form_block(m)
     assert [str(block.mode[0, j].expr) for j in (1, 2)] == ['y[0]  <=  20', 'dy[0]  ==  10 - 0.2*y[0]']
     assert not all_switched_systems(m).hysteresis
 

@@ -27,6 +27,7 @@ from tests.models import (
     thresholds,
     violation,
 )
+from tests.problems.forms_of import form_block
 
 
 def test_three_modes_cost_seven_variables_five_equations_and_three_pairs_a_time():
@@ -107,7 +108,7 @@ def test_continuous_multipliers_and_independent_selectors_are_recorded_for_the_e
 
 def test_two_modes_can_be_written_in_stewarts_form_on_request():
     m = dcs(signum(), form='stewart')
-    assert list(m._pyomo_fesd_dcs.component_map()) == ['sgn_stewart_2']
+    assert form_block(m)[0] == 'stewart_2'
     for x, on, dx in ((-2.0, m.below[0], 3), (1.5, m.above[0], 1)):
         m.x[0].value = x
         assert modes_on(m.sgn[0]) == [on]
@@ -161,7 +162,7 @@ def corners(draw):
 def test_inside_a_region_only_its_own_mode_is_on_with_its_own_rates(system):
     functions, modes, (x, y), x0 = system
     m = dcs(planar(functions, modes, x0=x0), form='stewart')
-    assert list(m._pyomo_fesd_dcs.component_map()) == ['sgn_stewart_4']
+    assert form_block(m)[0] == 'stewart_4'
     m.x[0].value, m.y[0].value = x, y
     number = owner(functions, modes, x, y)
     assert modes_on(m.sgn[0], tolerance=1e-6) == [m.sgn[0].disjuncts[number]]
