@@ -43,13 +43,16 @@ CHANGES = {
     'elastic': {'relaxation': 'elastic'},
     'elastic, eps_init 10': {'relaxation': 'elastic', 'eps_init': 10.0},
     'eps_init 10': {'eps_init': 10.0},
+    'eps_factor 0.2': {'eps_factor': 0.2},
     'eps_factor 0.3': {'eps_factor': 0.3},
+    'eps_factor 0.5': {'eps_factor': 0.5},
     'relaxation alone, scholtes': {'mode': 'relaxation', 'relaxation': 'scholtes'},
     'equilibration penalty': {'equilibration': 'penalty'},
     'equilibration complementarity': {'equilibration': 'complementarity'},
     'equilibration none': {'equilibration': 'none'},
     'pairs of points': {'cross_complementarity': 'point'},
     'all pairs': {'cross_complementarity': 'full'},
+    'sums of pairs': {'cross_complementarity': 'element'},
     'one collocation point': {'ncp': 1},
     'two collocation points': {'ncp': 2},
     'three collocation points': {'ncp': 3},
@@ -86,7 +89,9 @@ FITS = {
 def fits(problem, form, options):
     """Whether the form has these options, and they change something."""
     p = run.cases.module(problem)
-    same = options in ({'ncp': p.NCP}, {'elements': p.ELEMENTS})
+    # contacts that must not slip have all pairs by default
+    cross = 'full' if (problem, form) == ('hopper', 'contact') else 'element'
+    same = options in ({'ncp': p.NCP}, {'elements': p.ELEMENTS}, {'cross_complementarity': cross})
     return not same and all(FITS[name](problem, form) for name in options if name in FITS)
 
 

@@ -76,7 +76,8 @@ class Branches:
         """
         point = self._point(relaxed.w, sets.zero, relaxed, final)
         if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
-            zero = self._subsolves.suggestion(relaxed.w, sets, self._tolerances.radius).zero
+            # undecided sides may be written in several ways
+            zero = self._subsolves.settled(relaxed.w, self._subsolves.suggestion(relaxed.w, sets, self._tolerances.radius).zero)
             point = self._point(relaxed.w, zero, relaxed, final)
         # with the global LPEC search for better branches now: this point is not revisited
         self.improve_from(point, final or self._global_lpec)
