@@ -20,16 +20,12 @@ from pyomo_fesd.mpcc.subproblems.linear_program import Program, infeasible
 from pyomo_fesd.mpcc.subproblems.side_constraints import settle, with_shares
 
 #: A branch starts near its solution: not so close to the bounds that Ipopt's steps are cut short, nor pushed far from them.
-NEAR = {
-    'mu_strategy': 'monotone',
-    'mu_init': 1e-4,
-    'bound_push': 1e-4,
-    'bound_frac': 1e-4,
-    'constr_viol_tol': 1e-11,
-    'compl_inf_tol': 1e-10,
-}
+NEAR = {'mu_strategy': 'monotone', 'mu_init': 1e-4, 'bound_push': 1e-4, 'bound_frac': 1e-4}
 #: One that starts elsewhere is left to Ipopt's own centring.
-FAR = {name: NEAR[name] for name in ('constr_viol_tol', 'compl_inf_tol')}
+FAR = {}
+#: Violation of the rows, and of the complementarity of bounds: in the user's unit of the objective where that is larger than the
+#: solver's, down to the last one.
+FEASIBILITY, OPTIMALITY, LEAST = 1e-11, 1e-10, 1e-12
 #: Status of a branch that has a solution only if places of fillings are open.
 UNDECIDED = 'fillings undecided'
 #: A row without free variables, or one of more equations than free variables, may miss its bounds by this much.
@@ -55,7 +51,8 @@ class Branch:
         self._pattern = csr_pattern(nlp.derivatives.jacobian)
         self._values = ca.Function('rows', [nlp.x, nlp.p], [nlp.g])
         given = nlp.x, nlp.p, nlp.f, nlp.g
-        self._nlp, self._far = (make('branch', *given, budget, nlp.derivatives) for budget in (NEAR, FAR))
+        exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': max(OPTIMALITY * min(1.0, c.scale.f), LEAST)}
+        self._nlp, self._far = (make('branch', *given, budget | exact, nlp.derivatives) for budget in (NEAR, FAR))
 
     def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None, settled=ROW_TOLERANCE, far=False):
         """Solve the branch ``zero`` from ``w``.

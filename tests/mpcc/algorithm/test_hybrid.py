@@ -44,6 +44,17 @@ def test_toy_is_solved_from_the_origin_and_from_20_random_starts():
         assert pyo.value(model.f) == pytest.approx(best, abs=1e-9)
 
 
+@pytest.mark.parametrize('steepness', [1e4, 1e7, 1e9, 1e10])
+def test_a_steep_term_leaves_the_rest_of_the_objective_exact(steepness):
+    m = pyo.ConcreteModel()
+    m.x, m.y, m.z = (pyo.Var(bounds=(0, None), initialize=start) for start in (3, 1, 1))
+    m.c = Complementarity(expr=complements(m.y >= 0, m.z >= 0))
+    m.enough = pyo.Constraint(expr=m.y + m.z >= m.x)
+    m.f = pyo.Objective(expr=steepness * (m.x - 1) ** 2 + m.y + 2 * m.z)
+    assert solve(m).solver.stationarity == 'B'
+    assert pyo.value(m.f) == pytest.approx(1 - 1 / (4 * steepness), abs=2e-6)
+
+
 def test_infeasible_problem_is_called_infeasible_with_the_violated_pair_by_name():
     model, _ = small_mpccs.toy()
     model.sum = pyo.Constraint(expr=model.x + model.y >= 1)
