@@ -1,8 +1,9 @@
 """Write one Disjunction at one time: its multipliers, the blended equations (theory, eq. 7) and the way back to the sources.
 
 Takes: a ``ModeSystem`` or ``HysteresisSystem``, and the form that was chosen for it (None where one mode is left).
-Leaves: a block beside the Disjunction for each form and size, with the components of the form, ``mode`` (eq. 7) and ``own``
-    (copies of variables for implicit modes), and the record of multipliers; the Disjunction and its disjuncts are deactivated.
+Leaves: a block beside the Disjunction, of its name, with the components of the smallest form, ``mode`` (eq. 7) and ``own``
+    (copies of variables for implicit modes), or blocks below for other forms and sizes; the record of multipliers; the Disjunction
+    and its disjuncts are deactivated.
 """
 
 from collections.abc import Callable

@@ -19,10 +19,9 @@ from pyomo_fesd.mpcc.subproblems.active_set import FREE
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, infeasible
 from pyomo_fesd.mpcc.subproblems.side_constraints import settle, with_shares
 
-#: A branch starts near its solution: not so close to the bounds that Ipopt's steps are cut short, nor pushed far from them.
+#: A branch starts near its solution: not so close to the bounds that Ipopt's steps are cut short, nor pushed far from them.  One
+#: that starts elsewhere is left to Ipopt's own centring.
 NEAR = {'mu_strategy': 'monotone', 'mu_init': 1e-4, 'bound_push': 1e-4, 'bound_frac': 1e-4}
-#: One that starts elsewhere is left to Ipopt's own centring.
-FAR = {}
 #: Violation of the rows, and of the complementarity of bounds: in the user's unit of the objective where that is larger than the
 #: solver's, down to the last one.
 FEASIBILITY, OPTIMALITY, LEAST = 1e-11, 1e-10, 1e-12
@@ -52,7 +51,7 @@ class Branch:
         self._values = ca.Function('rows', [nlp.x, nlp.p], [nlp.g])
         given = nlp.x, nlp.p, nlp.f, nlp.g
         exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': max(OPTIMALITY * min(1.0, c.scale.f), LEAST)}
-        self._nlp, self._far = (make('branch', *given, budget | exact, nlp.derivatives) for budget in (NEAR, FAR))
+        self._nlp, self._far = (make('branch', *given, budget, nlp.derivatives) for budget in (NEAR | exact, exact))
 
     def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None, settled=ROW_TOLERANCE, far=False):
         """Solve the branch ``zero`` from ``w``.

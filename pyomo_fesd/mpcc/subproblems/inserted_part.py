@@ -228,7 +228,7 @@ class InsertedPart:
     def _least_step(self, A, residual, w, free):
         """The step of least length in which gates, and what the equations leave undetermined, stay within their bounds."""
         gates, low, high = self._gates[free], self._c.lbx[free], self._c.ubx[free]
-        bound, determined = np.full(len(free), np.nan), True
+        bound = np.full(len(free), np.nan)
         for _ in range(1 + len(free)):
             inner = np.isnan(bound)
             step = np.where(inner, 0.0, bound - w[free])
@@ -238,11 +238,10 @@ class InsertedPart:
             step[inner] = Vt[:rank].T @ ((U[:, :rank].T @ target) / s[:rank])
             loose = np.zeros(len(free), dtype=bool)
             loose[inner] = np.abs(Vt[rank:]).max(axis=0, initial=0.0) > UNDETERMINED
-            determined &= not np.any(loose & ~gates)
             reached = w[free] + step
             below, above = (gates & inner | loose) & (reached < low - EXACT), loose & (reached > high + EXACT)
             if not (below | above).any():
-                return step, determined
+                return step, not np.any((loose | ~inner) & ~gates)
             bound[below], bound[above] = low[below], high[above]
         return step, False
 
