@@ -52,7 +52,7 @@ def test_a_point_is_certified_if_and_only_if_no_slope_descends(surface, nfe, ncp
     assert pyomo_fesd.certify(m).certified == (right > 0)
 
 
-@pytest.mark.xfail(strict=True, reason='on two elements the place before a switch at the first time cannot grow in the LPEC')
+@pytest.mark.xfail(strict=True, reason='the LPEC with a part inserted at the first time finds no descent on two elements')
 def test_a_switch_at_the_first_time_on_two_elements_is_not_certified_where_a_slope_descends():
     assert not certified(Surface(True, 1.5, 1.0, -0.5), 2, 1, RADAU)
 
