@@ -6,6 +6,7 @@ Takes: a program whose columns have a known reach.
 Leaves: a point, the rows' multipliers where there are no binaries, and HiGHS' bound; None where HiGHS' own answer does not hold.
 """
 
+import threading
 from dataclasses import dataclass
 
 import highspy
@@ -140,9 +141,11 @@ def infeasible(program) -> bool:
 def _run(highs):
     """Run HiGHS, also where the last run in this thread, perhaps of another tool, had another number of threads."""
     if highs.run() == highspy.HighsStatus.kError:
-        # it does not wait for these threads: after a fork they do not exist
-        highspy.Highs.resetGlobalScheduler(False)
-        highs.run()
+        # HiGHS keeps its scheduler for each thread.  A new thread has none; the one of this thread may come from before a fork,
+        # with locks that nobody opens any more
+        another = threading.Thread(target=highs.run)
+        another.start()
+        another.join()
 
 
 def _answer(highs, p, limited):

@@ -1,7 +1,8 @@
 """Linear programs in HiGHS: the answer, and the attempts where a method does not end."""
 
-import multiprocessing
 import os
+import subprocess
+import sys
 
 import highspy
 import numpy as np
@@ -64,17 +65,29 @@ def test_it_runs_after_another_tool_has_set_the_number_of_threads(many_threads, 
     assert solve(knapsack(), options, Deadline()).d == pytest.approx(solve(knapsack(), {}, Deadline()).d)
 
 
-def test_after_it_another_tool_runs_with_one_thread():
+@pytest.mark.parametrize('threads', [1, 3])
+def test_after_it_another_tool_runs_with_its_number_of_threads(many_threads, threads):
+    highspy.Highs.resetGlobalScheduler(True)
+    highs_with(threads)
     solve(knapsack(), {}, Deadline())
-    assert highs_with(1) == highspy.HighsStatus.kOk
+    assert highs_with(threads) == highspy.HighsStatus.kOk
+
+
+FORKS = """
+import faulthandler, os
+from tests.mpcc.subproblems.test_linear_program import Deadline, highs_with, knapsack, solve
+
+highs_with(3)
+child = os.fork()
+if child == 0:
+    faulthandler.dump_traceback_later(50, exit=True)
+    solve(knapsack(), {}, Deadline())
+    os._exit(0)
+raise SystemExit(os.waitpid(child, 0)[1])
+"""
 
 
 @pytest.mark.skipif(not hasattr(os, 'fork'), reason='no fork on this system')
-def test_a_forked_process_solves_programs_too(many_threads):
-    # the worker threads of the other tool do not exist there
-    child = multiprocessing.get_context('fork').Process(target=solve, args=(knapsack(), {}, Deadline()))
-    child.start()
-    child.join(60)
-    stuck = child.is_alive()
-    child.kill()
-    assert not stuck
+def test_a_forked_process_solves_programs_too():
+    # the worker threads of the other tool do not exist there; a process of its own has no others that hold locks
+    subprocess.run([sys.executable, '-c', FORKS], check=True, timeout=100)
