@@ -5,6 +5,7 @@ import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 from pyomo.common.collections import ComponentSet
+from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
 from pyomo_fesd.core import TimeIndex, all_hints, moving_grids
@@ -54,8 +55,8 @@ def test_nothing_is_inserted_between_modes_with_hysteresis():
 MINIMA, OTHERS = (9, 14), (0, 1)
 
 
-def at_the_coincidence(relays, nfe, form):
-    m = transform(coupled_relays.build(relays), nfe, form=form)
+def at_the_coincidence(relays, nfe, form, *more):
+    m = transform(coupled_relays.build(relays, *more), nfe, form=form)
     m.theta.fix(1)
     pyomo_fesd.simulate(m)
     m.theta.unfix()
@@ -69,6 +70,65 @@ def at_the_coincidence(relays, nfe, form):
 def test_coupled_switches_are_certified_where_both_orders_cost_more_and_nowhere_else(seed, form, nfe):
     relays = coupled_relays.Relays.draw(seed)
     assert pyomo_fesd.certify(at_the_coincidence(relays, nfe, form)).certified == relays.is_minimum
+
+
+def bounds_at_the_end(m, least):
+    for i in m.i:
+        m.x[coupled_relays.END, i].setlb(least[i - 1])
+
+
+def row_at_the_end(m, least):
+    m.end = pyo.Constraint(m.i, rule=lambda m, i: m.x[coupled_relays.END, i] >= least[i - 1])
+
+
+def path_and_end(m, least):
+    m.path = pyo.Constraint(m.t, m.i, rule=lambda m, t, i: m.x[t, i] >= -1)
+    row_at_the_end(m, least)
+
+
+def nonlinear_row_at_the_end(m, least):
+    m.end = pyo.Constraint(expr=m.x[coupled_relays.END, 1] * m.x[coupled_relays.END, 2] >= least.prod() * m.theta)
+
+
+def equations_at_the_end(m, _):
+    m.z = pyo.Var(m.i)
+    m.end = pyo.Constraint(m.i, rule=lambda m, i: m.z[i] == m.x[coupled_relays.END, i])
+
+
+def clock_with_given_end(m, _):
+    m.y = pyo.Var(m.t, initialize=0)
+    m.dy = dae.DerivativeVar(m.y, wrt=m.t)
+    m.speed = pyo.Var(initialize=1)
+    m.tick = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == m.speed)
+    m.y[0].fix(0)
+    m.y[coupled_relays.END].fix(1)
+
+
+def pair_at_the_end(m, least):
+    m.v = pyo.Var(bounds=(0, None), initialize=0)
+    m.end = Complementarity(expr=complements(m.x[coupled_relays.END, 1] >= least[0], m.v >= 0))
+
+
+@pytest.mark.parametrize(
+    'more, known',
+    [
+        (bounds_at_the_end, True),
+        (row_at_the_end, True),
+        (path_and_end, True),
+        (nonlinear_row_at_the_end, True),
+        (equations_at_the_end, True),
+        (clock_with_given_end, False),
+        (pair_at_the_end, False),
+    ],
+)
+@pytest.mark.parametrize('seed', MINIMA + OTHERS)
+def test_conditions_at_the_end_do_not_hold_between_switches(seed, more, known):
+    # on two elements the part that is copied is the last one
+    relays = coupled_relays.Relays.draw(seed)
+    least = relays.last(1) - 0.01
+    for nfe in (2, 3):
+        found = pyomo_fesd.certify(at_the_coincidence(relays, nfe, 'auto', lambda m: more(m, least))).certified
+        assert found == relays.is_minimum if known else found <= relays.is_minimum
 
 
 def test_the_seeds_have_minima_and_others():

@@ -33,13 +33,17 @@ class Relays:
 
     def objective(self, theta):
         """Return the exact objective."""
+        return float(self.w @ self.last(theta))
+
+    def last(self, theta):
+        """Return the exact last states."""
         x, s, left = np.zeros(2), [0, 0], END
         while True:
             rate, to_go = self.r[:, s[0], s[1]], self.p + self.q * theta - x
             times = [np.inf if s[i] else to_go[i] / rate[i] for i in range(2)]
             first = int(np.argmin(times))
             if times[first] >= left:
-                return float(self.w @ (x + rate * left))
+                return x + rate * left
             x, left = x + rate * times[first], left - times[first]
             s[first] = 1
 
@@ -49,8 +53,8 @@ class Relays:
         return min(self.objective(1 + step) for step in (-1e-5, 1e-5)) >= self.objective(1) - 1e-12
 
 
-def build(relays):
-    """The problem as a model."""
+def build(relays, more=lambda m: None):
+    """The problem as a model; ``more`` adds to it."""
     m = pyo.ConcreteModel()
     m.t, m.i = dae.ContinuousSet(bounds=(0, END)), pyo.RangeSet(2)
     m.theta = pyo.Var(initialize=1, bounds=(0.5, 1.5))
@@ -70,4 +74,5 @@ def build(relays):
         return m.dx[t, i] == a + (c - a) * first + (b - a) * second + (a - b - c + d) * first * second
 
     m.cost = pyo.Objective(expr=sum(relays.w[i - 1] * m.x[END, i] for i in m.i))
+    more(m)
     return m

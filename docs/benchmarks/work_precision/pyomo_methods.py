@@ -5,6 +5,7 @@ Each takes a problem of ``models`` and its settings, and returns a ``Found``.
 
 import time
 
+import highspy
 import pyomo.environ as pyo
 from benchmarks.work_precision.models import SCHEMES, SystemModel, smooth, state
 from benchmarks.work_precision.systems import Found, reached
@@ -76,6 +77,8 @@ def big_m(problem, K, N, scheme, limit, **_):
     m = _bound_rates(problem.fixed(K, N, scheme), problem.system)
     pyo.TransformationFactory('gdp.bigm').apply_to(m)
     m.constant = pyo.Objective(expr=0)
+    # HiGHS refuses a run with another number of threads than the last one of this thread, which may have had its default
+    highspy.Highs.resetGlobalScheduler(True)
     built = time.perf_counter()
     results = SolverFactory('highs').solve(
         m, time_limit=limit, threads=1, raise_exception_on_nonoptimal_result=False, load_solutions=False

@@ -82,8 +82,10 @@ class PartIndices:
         all variables at its end
     chain, number : int
         its chain, and its place in it
+    alike : bool
+        whether those of its variables are given that are given in a part beside it
     whole : bool
-        whether all variables of the part are free, but for those that are given in all parts
+        whether, besides, those of its first values are given that are given of its last ones
     copies : bool
     """
 
@@ -96,6 +98,7 @@ class PartIndices:
     ends: np.ndarray
     chain: int
     number: int
+    alike: bool
     whole: bool
     copies: bool
 

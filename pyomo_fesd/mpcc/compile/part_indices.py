@@ -15,21 +15,34 @@ NONE = -1
 
 def part_indices(chains, columns) -> list[PartIndices]:
     """Return the parts of all chains by positions, without parts whose extent is given."""
-    found = ((part, k, number) for k, chain in enumerate(chains) for number, part in enumerate(chain))
-    return [_part(part, columns, *place) for part, *place in found if id(part.extent) in columns]
+    return [part for k, chain in enumerate(chains) for part in _parts(chain, columns, k)]
 
 
-def _part(part, columns, chain, number):
+def _parts(chain, columns, k):
+    given = [_given(part, columns) for part in chain]
+    for number, part in enumerate(chain):
+        if id(part.extent) in columns:
+            beside = given[max(number - 1, 0) : number] + given[number + 1 : number + 2]
+            yield _part(part, columns, k, number, not beside or given[number] in beside)
+
+
+def _part(part, columns, k, number, alike):
     one_is_given = any((id(first) in columns) != (id(last) in columns) for first, last in part.ends)
     return PartIndices(
-        columns[id(part.extent)][0],
-        positions_of(part.own, columns),
-        positions_of(part.gate, columns),
-        np.array([columns[id(v)][0] if id(v) in columns else NONE for v in part.own], dtype=int),
-        *both_positions(part.ends, columns),
-        positions_of([last for _, last in part.ends], columns),
-        chain,
-        number,
-        not one_is_given,
-        part.copies,
+        extent=columns[id(part.extent)][0],
+        own=positions_of(part.own, columns),
+        gate=positions_of(part.gate, columns),
+        places=np.array([columns[id(v)][0] if id(v) in columns else NONE for v in part.own], dtype=int),
+        **dict(zip(('first', 'last'), both_positions(part.ends, columns))),
+        ends=positions_of([last for _, last in part.ends], columns),
+        chain=k,
+        number=number,
+        alike=alike,
+        whole=alike and not one_is_given,
+        copies=part.copies,
     )
+
+
+def _given(part, columns):
+    """Places of the variables that are given; those that only some parts of a chain have are not, and come after the others."""
+    return [place for place, v in enumerate(part.own) if id(v) not in columns]

@@ -10,6 +10,7 @@ beside parts of nearly no extent, and where variables say how a part begins: of 
 """
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -49,7 +50,7 @@ class EndInsertions:
     def _applies(self, w, sets, order):
         end, inner = (self._parts.all[k] for k in (order.end, order.inner))
         undecided = (sets.gamma | sets.open) & (self._parts.of_pair == order.end)
-        possible = inner.whole and len(end.places) == len(inner.places)
+        possible = inner.whole and len(end.places) == len(inner.places) and not self._parts.ends_with_pairs(order.inner)
         return possible and not undecided.any() and not self._parts.is_beside_a_short_one(w, order.end)
 
     def _values(self, w, sets, order):
@@ -120,16 +121,24 @@ class JoinedAtEnd(JoinedLpec):
         base = base + self._contributions(shared @ A, shared @ of_copy[self._program_rows])
         new = self._with_columns(of_copy[self.rows], np.ones(len(self.rows), dtype=bool), self._of_copy)
         cut = base.shape[0] - self._last
-        cost = np.concatenate([np.where(self._of_end, cost_here, cost), cost_of_copy[self.own]])
+        source = self._source
+        of_copy = [cost[source[j]] if j in source and j in self._values.ends else cost_of_copy[j] for j in self.own]
+        cost = np.concatenate([np.where(self._of_end, cost_here, cost), of_copy])
         return cost, sparse.vstack([base[:cut], new, base[cut:]], format='csr')
 
     def _contributions(self, A, of_copy):
-        """Entries of shared rows in the columns of the copy: those that e had, at its end those that i has."""
-        values = self._values
-        source = {j: k for j, k in zip(values.of_inner, values.of_end) if j not in set(values.ends)}
+        """Entries of shared rows in the columns of the copy: those that e had, or that i has."""
+        source = self._source
         entries = [A[:, source[j]] if j in source else of_copy[:, j] for j in self.own]
-        units = sparse.diags(np.where(self.own == self._extent, 1.0 / values.unit, 1.0))
+        units = sparse.diags(np.where(self.own == self._extent, 1.0 / self._values.unit, 1.0))
         return sparse.hstack([sparse.csr_matrix((A.shape[0], self._n)), sparse.hstack(entries) @ units], format='csr')
+
+    @cached_property
+    def _source(self):
+        """Variables of i -> those of e whose share in objective and rows the copy takes; e keeps that of the last time."""
+        values = self._values
+        ends = [] if values.order.is_first else values.ends
+        return {j: k for j, k in zip(values.of_inner, values.of_end) if j not in ends}
 
     @property
     def _place_of_extent(self):

@@ -93,7 +93,7 @@ class EndValues:
         else:
             # its own equations may hold conditions on its last values; those of i at its end do not
             vanished = Insertion(order.inner, False, order.as_inner(self.zero), held, (order.inner,))
-        self.vanished, self._guesses = Copy(c, sides, parts, vanished), vanished.guesses
+        self.vanished, self._guesses = Copy(parts.of_copies, sides, parts, vanished), vanished.guesses
         self.held = self.here = None
 
     def solve(self) -> bool:
@@ -137,8 +137,8 @@ class EndValues:
         return self.held[self._i.extent] / self.w[self._e.extent]
 
     def _equations(self, k, columns, zero):
-        rows = np.flatnonzero(self._parts.of_row == k)
-        return InsertedPart(self._c, self._sides, self._parts, columns, rows, zero)
+        c, rows = self._c if k == self.order.end else self._parts.of_copies, np.flatnonzero(self._parts.of_row == k)
+        return InsertedPart(c, self._sides, self._parts, columns, rows, zero)
 
     @property
     def extent(self):
@@ -164,7 +164,7 @@ class EndValues:
 
         ``fixed`` are variables that do not move.
         """
-        own, w, c = self._i.own, self.held, self._c
+        own, w, c = self._i.own, self.held, self._parts.of_copies
         low, high = self._copy.distances(w)
         reach = radius * sizes_of(w[own])
         still = np.isin(own, [*self._copy.fixed, *fixed])
@@ -179,4 +179,4 @@ class EndValues:
 
     @property
     def _copy(self):
-        return Copy(self._c, self._sides, self._parts, self.copied)
+        return Copy(self._parts.of_copies, self._sides, self._parts, self.copied)

@@ -55,7 +55,7 @@ class Insertions:
             return Verdict.UNKNOWN
         with self._c.vanishing(np.array([part.extent])):
             for guess in insertion.guesses:
-                copy = Copy(self._c, self._sides, self._parts, insertion)
+                copy = self._copy(insertion)
                 found.append(self._of_copy(w, sets, equal, insertion, copy, guess, present))
                 if copy.determined and found[-1] is not Verdict.UNKNOWN:
                     return found[-1]
@@ -97,10 +97,11 @@ class Insertions:
         return w
 
     def _applies(self, w, insertion, grows):
-        part = self._parts.all[insertion.k]
+        k, part = insertion.k, self._parts.all[insertion.k]
         # the copy of a part whose first values are given begins with them
-        possible = (part.whole or (insertion.ahead and not grows)) and not (grows and self._following(insertion) is None)
-        return possible and not self._parts.is_beside_a_short_one(w, insertion.k)
+        begins = part.whole or (part.alike and insertion.ahead and not grows)
+        goes_on = not grows or self._following(insertion) is not None
+        return begins and goes_on and not (self._parts.ends_with_pairs(k) or self._parts.is_beside_a_short_one(w, k))
 
     @staticmethod
     def _by_values(w, insertion, copy, guess):
@@ -113,9 +114,12 @@ class Insertions:
 
     def _unchanged(self, w, sets, equal, present):
         """The LPEC with a copy that changes nothing (None without one), and the place of its extent."""
-        copy = Copy(self._c, self._sides, self._parts, present)
+        copy = self._copy(present)
         found = self._by_lpec(w, sets, equal, present, copy, 0.0) if copy.solve(w, present.guesses) else None
         return found, len(w) + int(np.flatnonzero(copy.own == copy.part.extent)[0])
+
+    def _copy(self, insertion):
+        return Copy(self._parts.of_copies, self._sides, self._parts, insertion)
 
     def _following(self, insertion):
         """The part after the copy."""

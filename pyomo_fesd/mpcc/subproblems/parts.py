@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from pyomo_fesd.mpcc.compile import with_entries
+from pyomo_fesd.mpcc.subproblems.end_conditions import WithoutEndConditions
 
 #: Instead of the number of a part: of none, and of several.
 NONE, SHARED = -1, -2
@@ -70,7 +71,8 @@ class Parts:
         return found
 
     @cached_property
-    def _is_last(self):
+    def is_last(self):
+        """Whether a variable (n) is at the end of its part."""
         found = np.zeros(len(self._c.x0), dtype=bool)
         for part in self.all:
             found[part.ends] = True
@@ -93,6 +95,15 @@ class Parts:
             found[m : m + 2 * q] = np.tile(np.array(of_pairs, dtype=int), 2)
         return found
 
+    @cached_property
+    def of_copies(self):
+        """The MPCC as copies of parts have it: without conditions on last values of one part."""
+        return WithoutEndConditions(self._c, self)
+
+    def ends_with_pairs(self, k):
+        """Whether pairs of part ``k`` are conditions on its last values that no other part has: no copy ends elsewhere."""
+        return k in self.of_copies.parts_with_pairs
+
     @property
     def of_pair(self):
         """The part of each pair."""
@@ -105,7 +116,7 @@ class Parts:
         m, q = len(self._c.lbg), self._c.pairs
         pattern = self.pattern
         inner = self.of_variable >= 0
-        inner[self.is_gate | self._is_last] = False
+        inner[self.is_gate | self.is_last] = False
         inner[[part.extent for part in self.all]] = False
         counts = pattern @ inner.astype(float)
         own_last = self._with_own_last(pattern)
@@ -114,7 +125,7 @@ class Parts:
     def _with_own_last(self, pattern):
         """Whether a row contains last values of the part that it belongs to."""
         entries = pattern.tocoo()
-        hit = self._is_last[entries.col] & (self.of_variable[entries.col] == self.of_row[entries.row])
+        hit = self.is_last[entries.col] & (self.of_variable[entries.col] == self.of_row[entries.row])
         found = np.zeros(pattern.shape[0], dtype=bool)
         found[entries.row[hit]] = True
         return found
@@ -126,4 +137,4 @@ class Parts:
             return parts[0] if len(parts) else NONE
         one, other = parts[-2:]
         adjacent = len(parts) == 2 and self.next(one) == other
-        return other if adjacent and self._is_last[columns[owners == one]].all() else SHARED
+        return other if adjacent and self.is_last[columns[owners == one]].all() else SHARED

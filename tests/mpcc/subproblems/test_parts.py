@@ -20,8 +20,8 @@ def of_hand():
     """Parts 0 and 1 follow one another; part 2 is a chain of its own."""
     parts, places = [], [(0, 0), (0, 1), (1, 0)]
     for own, before, place in zip(PARTS, (0, 4, 0), places):
-        gate, last = np.array(own[1:2]), np.array(own[3:])
-        parts.append(PartIndices(own[0], np.array(own), gate, np.array(own), np.array([before]), last, last, *place, True, True))
+        own, gate, last = np.array(own), np.array(own[1:2]), np.array(own[3:])
+        parts.append(PartIndices(own[0], own, gate, own, np.array([before]), last, last, *place, True, True, True))
     columns = [row for row, _ in ROWS] + [first for first, *_ in PAIRS] + [second for _, second, *_ in PAIRS]
     J = np.zeros((len(columns), 13))
     for row, entries in zip(J, columns):
