@@ -4,6 +4,7 @@ A Disjunction has the same key at every time, and so has another one that the sa
 the others, with their variables exchanged for those of the first one.
 """
 
+import threading
 from functools import cache
 
 from pyomo.common.numeric_types import native_types
@@ -108,14 +109,21 @@ def expression_key(expressions, kind) -> tuple:
         return None, []
 
 
-#: Pyomo takes longer to make a visitor than to use it.
-_VISITOR = ExpressionReplacementVisitor()
+class _OfThread(threading.local):
+    """A visitor for each thread: Pyomo takes longer to make one than to use it, and it keeps what it exchanges."""
+
+    def __init__(self):
+        self.visitor = ExpressionReplacementVisitor()
+
+
+_OF_THREAD = _OfThread()
 
 
 def exchanged(expr, others: dict):
     """Return ``expr`` with other components, given by the ids of the present ones; named Expressions are written out."""
-    _VISITOR.substitute = others
-    return _VISITOR.walk_expression(expr)
+    visitor = _OF_THREAD.visitor
+    visitor.substitute = others
+    return visitor.walk_expression(expr)
 
 
 class Swap:

@@ -1,9 +1,13 @@
 """Keys of expressions: the analysis of one time, reused for the others, must equal an analysis of each time."""
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 from pyomo.core.expr.compare import compare_expressions
+from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunction
 
 from pyomo_fesd.core.errors import FesdError
@@ -120,3 +124,19 @@ def test_exchanges_do_not_know_of_one_another(m):
     assert compare_expressions(exchanged(law, {id(m.x[0]): m.x[2]}), m.x[2] + pyo.exp(m.x[1]))
     assert compare_expressions(exchanged(law, {id(m.x[1]): m.x[3]}), m.x[0] + pyo.exp(m.x[3]))
     assert exchanged(2.0, {}) == 2.0 and exchanged(m.x[0], {id(m.x[0]): 1.0}) == 1.0
+
+
+def test_threads_exchange_components_at_the_same_time():
+    def exchange(k):
+        m = pyo.ConcreteModel()
+        m.x, m.y = pyo.Var(range(40)), pyo.Var(range(40))
+        found = exchanged(sum(v**2 for v in m.x.values()), {id(m.x[i]): m.y[i] for i in m.x})
+        return {id(v) for v in identify_variables(found)} == {id(v) for v in m.y.values()}
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            assert all(pool.map(exchange, range(200)))
+    finally:
+        sys.setswitchinterval(interval)
