@@ -139,7 +139,10 @@ def infeasible(program) -> bool:
 
 
 def _run(highs):
-    """Run HiGHS, also where the last run in this thread, perhaps of another tool, had another number of threads."""
+    """Run HiGHS, also where the last run in this thread, perhaps of another tool, had another number of threads.
+
+    HiGHS refuses such a run with the same error as a start from which its simplex method cannot go on; the second run has none.
+    """
     if highs.run() == highspy.HighsStatus.kError:
         # HiGHS keeps its scheduler for each thread.  A new thread has none; the one of this thread may come from before a fork,
         # with locks that nobody opens any more
