@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from benchmarks.ocp import replay, run
+from benchmarks.ocp import replay, run, scaling
 from benchmarks.ocp.summary import PROBLEMS
 
 #: A coarse grid's error of the objective, relative.
@@ -65,3 +65,11 @@ def test_the_twin_in_nosnoc_states_the_same_problem(problem):
     p = run.module(problem)
     found, _ = run.with_nosnoc(p, None, 60)
     assert found['objective'] == pytest.approx(p.REFERENCE, rel=1e-3)
+
+
+def test_ipopt_would_scale_the_rows_of_the_motor_and_the_objective_of_the_cart():
+    of_objective, of_rows = scaling.gradients(scaling.started('motor', 0))
+    assert of_objective <= scaling.LARGEST < of_rows.max()
+    of_objective, of_rows = scaling.gradients(scaling.started('cartpole', 0))
+    assert of_rows.max() <= scaling.LARGEST < of_objective
+    assert scaling.changes(of_objective)['objective']['obj_scaling_factor'] == scaling.LARGEST / of_objective

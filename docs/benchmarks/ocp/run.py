@@ -54,7 +54,7 @@ def with_pyomo_fesd(p, controls, limit):
     ends = sorted(m.t)[1:]
     p.discretise(m)
     if controls is not None:
-        _initialise(m, ends, controls)
+        initialise(m, ends, controls)
     results = pyo.SolverFactory('mpec_hybrid').solve(m, time_limit=limit)
     seconds = time.perf_counter() - started
     (objective,) = m.component_data_objects(pyo.Objective, active=True)
@@ -69,7 +69,8 @@ def with_pyomo_fesd(p, controls, limit):
     }, used
 
 
-def _initialise(m, ends, controls):
+def initialise(m, ends, controls):
+    """Set the controls (stages, controls) as initial values; ``ends`` are the ends of the stages."""
     for t in m.t:
         stage = int(np.searchsorted(ends, t - 1e-9))
         for v, value in zip(_controls_at(m, t), controls[stage]):
