@@ -2,10 +2,11 @@
 
     .venv/bin/python docs/benchmarks/ocp/scaling.py
 
-Ipopt scales each row, and the objective, so that their largest gradient entries at the start of an NLP are at most 100.  Changes:
-``none``, neither; ``objective``, the objective alone, by the factor that Ipopt would take at the model's own initial values.  Eleven
-starts of each problem, as in run.py.  Writes scaling.csv beside this file, one row for each problem and change: medians over the
-starts.
+Ipopt scales each row, and the objective, so that their largest gradient entries at the start of an NLP are at most 100.
+
+Changes: ``none``, neither; ``objective``, the objective alone, by the factor that Ipopt would take at the initial values.
+Eleven starts of each problem, as in run.py.  Writes scaling.csv beside this file, one row for each problem and change: medians over
+the starts.
 """
 
 import sys
