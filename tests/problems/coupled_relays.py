@@ -37,14 +37,21 @@ class Relays:
 
     def last(self, theta):
         """Return the exact last states."""
-        x, s, left = np.zeros(2), [0, 0], END
+        return self._run(theta)[0]
+
+    def seconds(self, theta):
+        """Return how long each relay has been on at the end, exactly."""
+        return self._run(theta)[1]
+
+    def _run(self, theta):
+        x, s, left, on = np.zeros(2), [0, 0], END, np.zeros(2)
         while True:
             rate, to_go = self.r[:, s[0], s[1]], self.p + self.q * theta - x
             times = [np.inf if s[i] else to_go[i] / rate[i] for i in range(2)]
             first = int(np.argmin(times))
             if times[first] >= left:
-                return x + rate * left
-            x, left = x + rate * times[first], left - times[first]
+                return x + rate * left, on + left * np.array(s)
+            x, left, on = x + rate * times[first], left - times[first], on + times[first] * np.array(s)
             s[first] = 1
 
     @property

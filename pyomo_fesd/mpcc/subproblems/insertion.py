@@ -156,7 +156,7 @@ class Insertions:
             return None
         sets, equal, base, there = both
         joined = JoinedLpec(self._c, self._sides, self._parts, insertion, following, sets, equal)
-        if not joined.applies(w, copy.limit):
+        if not joined.is_known(w, copy.limit):
             return None
         base, limits = joined.with_following(base, there), copy.limits(radius, joined.fixed_by_following)
         return joined.best(self._lpec, sets, base, (w, beside, copy.limit), credit, limits, copy.fixed)

@@ -2,13 +2,14 @@
 
     rows of the model            at the point; those of the part after the copy begin with the last values of the copy
     rows of the copied part      at the values of the copy, in columns of its own; they begin with the last values before it
-    shared rows and objective    get the column of the extent of the copy; where that is 0, no other variable within it matters
-    conditions at the end of k   are those of the copy if it lies behind k; also what shared rows and objective have of last values
+    shared rows and objective    get the column of the extent of the copy; where that is 0, no other variable inside it matters
+
+A copy behind part k ends where k ended.  So it takes over from k the conditions on its end, and what shared rows and objective have
+of its last values.
 
 Takes: the LPEC at the point, and gradients at the point, beside the copy, and in the copy.
 Leaves: a ``Linearised`` LPEC, whose last variables are those of the copy.
-Does not apply: where objective or shared rows are not sums over the parts; where the values at the end of k change with the mode and
-a condition or the objective contains them.
+Does not apply: where objective or shared rows are not sums over the parts; where such last values change with the mode.
 """
 
 from dataclasses import replace
@@ -21,7 +22,6 @@ from pyomo_fesd.mpcc.subproblems.descent import Descent
 from pyomo_fesd.mpcc.subproblems.linear_program import Program
 from pyomo_fesd.mpcc.subproblems.lpec import Linearised, row_places, sizes_of
 from pyomo_fesd.mpcc.subproblems.parts import SHARED
-
 
 #: Agreement of gradients, relative to the largest one, and of values.
 SAME = 1e-6
@@ -72,8 +72,8 @@ class JoinedLpec:
         """Gradient of the objective and Jacobian of all rows at each point."""
         return [(self._c.gradients(at)[0], self._c.stacked_jacobian(at)) for at in points]
 
-    def applies(self, here, there) -> bool:
-        """Whether objective and shared rows are sums over the parts, and what they and conditions have of the end of k is as it was.
+    def is_known(self, here, there) -> bool:
+        """Whether objective and shared rows are sums over the parts, and what is passed on has the same values at the end of the copy.
 
         Parameters
         ----------
@@ -122,7 +122,9 @@ class JoinedLpec:
         """Make bounds that are conditions on the end of k those of the end of the copy behind it."""
         for j, of_copy in self._ends.items():
             if self._parts.of_copies.is_bounded[j]:
-                lower[of_copy], upper[of_copy] = max(lower[of_copy], lower[j]), min(upper[of_copy], upper[j])
+                # one that its sides fix has bounds no longer; without those of the copy there is only more descent
+                if lower[j] < upper[j] or self._c.lbx[j] == self._c.ubx[j]:
+                    lower[of_copy], upper[of_copy] = max(lower[of_copy], lower[j]), min(upper[of_copy], upper[j])
                 lower[j], upper[j] = -reach[j], reach[j]
 
     def _unfixed(self, lpec, w, sets, program):
@@ -162,8 +164,8 @@ class JoinedLpec:
         base = self._with_columns(A, self._begins, self._of_following)
         base = self._with_columns(base, self._end_rows, self._ends)
         base = base + self._entries(of_copy, self._shares, [self._extent], [self._place_of_extent])
-        at_end = (self._entries(of_copy, self._shared_rows, ends, columns) for columns in (ends_of_copy, ends))
-        base = base + next(at_end) - next(at_end)
+        passed_on, given_up = (self._entries(of_copy, self._shared_rows, ends, columns) for columns in (ends_of_copy, ends))
+        base = base + passed_on - given_up
         new = self._with_columns(of_copy[self.rows], np.ones(len(self.rows), dtype=bool), self._of_copy)
         cut = base.shape[0] - self._last
         return cost, sparse.vstack([base[:cut], new, base[cut:]], format='csr')
