@@ -62,9 +62,7 @@ class Boundary:
         m.dx = dae.DerivativeVar(m.x)
         m.x[0].fix(0)
         m.u[:].fix(0)
-        m.law = Disjunction(
-            m.t, rule=lambda m, t: [[m.x[t] <= 1 + m.p, m.dx[t] == 1], [m.x[t] >= 1 + m.p, m.dx[t] == self.s]]
-        )
+        m.law = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 1 + m.p, m.dx[t] == 1], [m.x[t] >= 1 + m.p, m.dx[t] == self.s]])
         m.cost = pyo.Objective(expr=self.v * m.x[1] + self.g * m.x[2] + self.w * m.p)
         if self.by_bound:
             (m.x[1].setlb if self.condition == 'at least' else m.x[1].setub)(1)

@@ -1,4 +1,6 @@
-"""Conditions that only one part has on its last values, as those at the final time: a copy of the part does not end there.
+"""Conditions that only one part has on its last values, as those at the final time.
+
+A copy of the part ahead of it does not end there; one behind it takes them over (``joined_lpec``).
 
 A row or a pair of a part is such a condition if it contains of the part's variables only last ones, and no part beside has as many
 of the same form: of the same quantities, and for rows between the same bounds in the model's units.  The bounds of a last value are

@@ -73,7 +73,7 @@ class JoinedLpec:
         return [(self._c.gradients(at)[0], self._c.stacked_jacobian(at)) for at in points]
 
     def is_known(self, here, there) -> bool:
-        """Whether objective and shared rows are sums over the parts, and what is passed on has the same values at the end of the copy.
+        """Whether objective and shared rows are sums over the parts, and the copy ends with the values that it takes over.
 
         Parameters
         ----------
