@@ -60,10 +60,10 @@ class Relays:
         return min(self.objective(1 + step) for step in (-1e-5, 1e-5)) >= self.objective(1) - 1e-12
 
 
-def build(relays, more=lambda m: None):
-    """The problem as a model; ``more`` adds to it."""
+def build(relays, more=lambda m: None, times=(0, END)):
+    """The problem as a model; ``more`` adds to it; ``times`` are the boundaries of control stages."""
     m = pyo.ConcreteModel()
-    m.t, m.i = dae.ContinuousSet(bounds=(0, END)), pyo.RangeSet(2)
+    m.t, m.i = dae.ContinuousSet(initialize=times), pyo.RangeSet(2)
     m.theta = pyo.Var(initialize=1, bounds=(0.5, 1.5))
     m.x, m.s = pyo.Var(m.t, m.i, initialize=0), pyo.Var(m.t, m.i, initialize=0)
     m.dx = dae.DerivativeVar(m.x, wrt=m.t)

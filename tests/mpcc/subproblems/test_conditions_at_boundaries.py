@@ -78,3 +78,16 @@ def test_with_the_square_of_an_integral_nothing_is_certified_that_descends():
         m.theta.unfix()
         assert not pyomo_fesd.certify(m).certified
     assert tried > 10
+
+
+@pytest.mark.xfail(strict=True, reason='an order in which two switches leave the boundary one by one takes two inserted elements')
+@pytest.mark.parametrize('seed', [1, 2, 5])
+def test_two_switches_at_a_boundary_are_not_certified_where_a_slope_descends(seed):
+    drawn = coupled_relays.Relays.draw(seed)
+    relays = coupled_relays.Relays(drawn.r, drawn.r[:, 0, 0] - drawn.q, drawn.q, drawn.w)
+    assert not relays.is_minimum
+    m = transform(coupled_relays.build(relays, times=(0, 1, 2)), 6, 2)
+    m.theta.fix(1)
+    pyomo_fesd.simulate(m)
+    m.theta.unfix()
+    assert not pyomo_fesd.certify(m).certified
