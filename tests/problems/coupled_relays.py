@@ -37,14 +37,21 @@ class Relays:
 
     def last(self, theta):
         """Return the exact last states."""
-        x, s, left = np.zeros(2), [0, 0], END
+        return self._run(theta)[0]
+
+    def seconds(self, theta):
+        """Return how long each relay has been on at the end, exactly."""
+        return self._run(theta)[1]
+
+    def _run(self, theta):
+        x, s, left, on = np.zeros(2), [0, 0], END, np.zeros(2)
         while True:
             rate, to_go = self.r[:, s[0], s[1]], self.p + self.q * theta - x
             times = [np.inf if s[i] else to_go[i] / rate[i] for i in range(2)]
             first = int(np.argmin(times))
             if times[first] >= left:
-                return x + rate * left
-            x, left = x + rate * times[first], left - times[first]
+                return x + rate * left, on + left * np.array(s)
+            x, left, on = x + rate * times[first], left - times[first], on + times[first] * np.array(s)
             s[first] = 1
 
     @property
@@ -53,10 +60,10 @@ class Relays:
         return min(self.objective(1 + step) for step in (-1e-5, 1e-5)) >= self.objective(1) - 1e-12
 
 
-def build(relays, more=lambda m: None):
-    """The problem as a model; ``more`` adds to it."""
+def build(relays, more=lambda m: None, times=(0, END)):
+    """The problem as a model; ``more`` adds to it; ``times`` are the boundaries of control stages."""
     m = pyo.ConcreteModel()
-    m.t, m.i = dae.ContinuousSet(bounds=(0, END)), pyo.RangeSet(2)
+    m.t, m.i = dae.ContinuousSet(initialize=times), pyo.RangeSet(2)
     m.theta = pyo.Var(initialize=1, bounds=(0.5, 1.5))
     m.x, m.s = pyo.Var(m.t, m.i, initialize=0), pyo.Var(m.t, m.i, initialize=0)
     m.dx = dae.DerivativeVar(m.x, wrt=m.t)

@@ -1,4 +1,6 @@
-"""Conditions that only one part has on its last values, as those at the final time: a copy of the part does not end there.
+"""Conditions that only one part has on its last values, as those at the final time.
+
+A copy of the part ahead of it does not end there; one behind it takes them over (``joined_lpec``).
 
 A row or a pair of a part is such a condition if it contains of the part's variables only last ones, and no part beside has as many
 of the same form: of the same quantities, and for rows between the same bounds in the model's units.  The bounds of a last value are
@@ -23,6 +25,10 @@ class WithoutEndConditions:
 
     Attributes
     ----------
+    is_condition : bool array (m)
+        whether a row is such a condition
+    is_bounded : bool array (n)
+        whether the bounds of a variable are
     parts_with_pairs : frozenset of int
         the parts that have such conditions among their pairs
     """
@@ -30,7 +36,7 @@ class WithoutEndConditions:
     def __init__(self, c, parts):
         self._c = c
         conditions = _Conditions(c, parts)
-        self._rows, self._bounds = conditions.of_rows(), conditions.of_bounds()
+        self.is_condition, self.is_bounded = conditions.of_rows(), conditions.of_bounds()
         self.parts_with_pairs = frozenset(parts.of_pair[conditions.of_pairs()].tolist())
 
     def __getattr__(self, name):
@@ -39,22 +45,22 @@ class WithoutEndConditions:
     @property
     def lbg(self):
         """Lower bounds of the rows."""
-        return np.where(self._rows, -np.inf, self._c.lbg)
+        return np.where(self.is_condition, -np.inf, self._c.lbg)
 
     @property
     def ubg(self):
         """Upper bounds of the rows."""
-        return np.where(self._rows, np.inf, self._c.ubg)
+        return np.where(self.is_condition, np.inf, self._c.ubg)
 
     @property
     def lbx(self):
         """Lower bounds of the variables."""
-        return np.where(self._bounds, -np.inf, self._c.lbx)
+        return np.where(self.is_bounded, -np.inf, self._c.lbx)
 
     @property
     def ubx(self):
         """Upper bounds of the variables."""
-        return np.where(self._bounds, np.inf, self._c.ubx)
+        return np.where(self.is_bounded, np.inf, self._c.ubx)
 
 
 class _Conditions:
@@ -86,7 +92,8 @@ class _Conditions:
         """Of which variables (n) the bounds are."""
         c, of_variable = self._c, self._parts.of_variable
         low, high = _rounded(c.lbx / c.scale.x), _rounded(c.ubx / c.scale.x)
-        return self._alone(of_variable, self._parts.is_last, lambda j: (self._quantity[j], low[j], high[j]))
+        among = self._parts.is_last & (np.isfinite(c.lbx) | np.isfinite(c.ubx))
+        return self._alone(of_variable, among, lambda j: (self._quantity[j], low[j], high[j]))
 
     def _of_last_values(self, pattern, of_row):
         """Which rows contain of the variables of their part only last ones."""

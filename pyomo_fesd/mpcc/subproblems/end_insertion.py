@@ -17,11 +17,8 @@ from scipy import sparse
 
 from pyomo_fesd.mpcc.subproblems.active_set import ActiveSets
 from pyomo_fesd.mpcc.subproblems.end_values import EndValues
-from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec, linearised_at_both
+from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec, agree, linearised_at_both
 from pyomo_fesd.mpcc.subproblems.verdict import Verdict, of_growth
-
-#: Agreement of gradients, relative to the largest one.
-SAME = 1e-6
 
 
 class EndInsertions:
@@ -108,7 +105,7 @@ class JoinedAtEnd(JoinedLpec):
         (cost, A), (cost_here, A_here) = ((cost[others], A[rows][:, others]) for cost, A in (before, here))
         inside = ~np.isin(values.of_inner, [*values.ends, self._extent])
         of_copy = held[0][values.of_inner[inside]]
-        return _agree(cost, cost_here) and _agree(A.data, A_here.data) and _agree(before[0][values.of_end[inside]], of_copy)
+        return agree(cost, cost_here) and agree(A.data, A_here.data) and agree(before[0][values.of_end[inside]], of_copy)
 
     def _joined(self, before, here, at_end, held):
         """Cost and rows of the model with the copy, of those at the points of ``values``."""
@@ -143,7 +140,3 @@ class JoinedAtEnd(JoinedLpec):
     @property
     def _place_of_extent(self):
         return self._values.extent
-
-
-def _agree(a, b):
-    return bool(np.abs(a - b).max(initial=0.0) <= SAME * max(1.0, np.abs(a).max(initial=0.0)))

@@ -145,7 +145,7 @@ class Insertions:
         return rows[self._parts.pattern[rows] @ inner.astype(float) == 0]
 
     def _by_lpec(self, w, sets, equal, insertion, copy, credit):
-        """The LPEC with the copy, growing at ``credit`` more for each unit; None where what follows the copy is not determined."""
+        """The LPEC with the copy, growing at ``credit`` more for each unit; None where it is not known."""
         following = self._following(insertion)
         beside = self._beside(w, sets.zero, insertion, copy)
         if beside is None:
@@ -156,5 +156,7 @@ class Insertions:
             return None
         sets, equal, base, there = both
         joined = JoinedLpec(self._c, self._sides, self._parts, insertion, following, sets, equal)
+        if not joined.is_known(w, copy.limit):
+            return None
         base, limits = joined.with_following(base, there), copy.limits(radius, joined.fixed_by_following)
         return joined.best(self._lpec, sets, base, (w, beside, copy.limit), credit, limits, copy.fixed)
