@@ -14,6 +14,7 @@ import logging
 from math import isnan, nan
 
 from pyomo.common.collections import ComponentMap
+from pyomo.common.gc_manager import PauseGC
 from pyomo.core import Block, Constraint, Suffix, Var
 from pyomo.core.base.suffix import SuffixFinder
 from pyomo.core.expr.visitor import identify_variables
@@ -37,6 +38,15 @@ def scale_by_values(block, least: float = 1e-3) -> int:
     least : float
         smallest magnitude of a variable that is not zero
     """
+    with PauseGC():
+        new = _factors(block, least)
+        for component, factor in new.items():
+            _set_factor(component, factor)
+    return len(new)
+
+
+def _factors(block, least):
+    """Factors of the variables and equations that have none."""
     find = SuffixFinder(NAME, None, block.model()).find
     variables = list(block.component_data_objects(Var, descend_into=Block))
     free = (v for v in variables if v.value and not v.fixed)
@@ -46,9 +56,7 @@ def scale_by_values(block, least: float = 1e-3) -> int:
     found = [_equation_factor(*slopes, factors) for slopes in gradients(c.body for c in equations)]
     _warn_without_value([c for c, factor in zip(equations, found) if isnan(factor)])
     new.update((c, factor) for c, factor in zip(equations, found) if factor > 0)
-    for component, factor in new.items():
-        _set_factor(component, factor)
-    return len(new)
+    return new
 
 
 def _unscaled(components, find):
