@@ -82,10 +82,10 @@ def simulate(
     inputs = read_inputs(inputs, wrt)
     deadline = Deadline.after(known(options).time_limit)
     options.pop('time_limit', None)
-    solve_static_equations(model, wrt)
     timer = timer or HierarchicalTimer()
-    with kept_values(states_fixed_later(model, wrt)), phase(timer, 'simulate'), PauseGC():
+    with PauseGC(), kept_values(states_fixed_later(model, wrt)), phase(timer, 'simulate'):
         with phase(timer, 'read'):
+            solve_static_equations(model, wrt)
             simulation = Simulation(model, wrt, inputs, options, timer, deadline)
         with phase(timer, 'march'):
             simulation.run()
