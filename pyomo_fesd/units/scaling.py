@@ -19,7 +19,7 @@ from pyomo.core import Block, Constraint, Suffix, Var
 from pyomo.core.base.suffix import SuffixFinder
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import gradients, is_generated
+from pyomo_fesd.core import gradients, is_generated, own_data
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -48,7 +48,7 @@ def scale_by_values(block, least: float = 1e-3) -> int:
 def _factors(block, least):
     """Factors of the variables and equations that have none."""
     find = SuffixFinder(NAME, None, block.model()).find
-    variables = list(block.component_data_objects(Var, descend_into=Block))
+    variables = list(_variables(block))
     free = (v for v in variables if v.value and not v.fixed)
     new = ComponentMap((v, 1 / max(abs(v.value), least)) for v in _unscaled(free, find))
     factors = {id(v): new.get(v) or find(v) or 1.0 for v in variables}
@@ -59,8 +59,21 @@ def _factors(block, least):
     return new
 
 
-def _unscaled(components, find):
-    return (c for c in components if find(c) is None and not is_generated(c))
+def _variables(block):
+    """The variables of a block and of References in it; in a whole model they only name variables again."""
+    whole = block.model() is block
+    return own_data(block, Var, Block) if whole else block.component_data_objects(Var, descend_into=Block)
+
+
+def _unscaled(datas, find):
+    """Data of the user without a factor."""
+    generated = ComponentMap()
+    for data in datas:
+        component = data.parent_component()
+        if component not in generated:
+            generated[component] = is_generated(component)
+        if not generated[component] and find(data) is None:
+            yield data
 
 
 def _equation_factor(variables, slopes, factors):
