@@ -15,11 +15,11 @@ from math import isnan, nan
 
 from pyomo.common.collections import ComponentMap
 from pyomo.common.gc_manager import PauseGC
-from pyomo.core import Block, Constraint, Suffix, Var
+from pyomo.core import Block, Constraint, Suffix
 from pyomo.core.base.suffix import SuffixFinder
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import gradients, is_generated, own_data
+from pyomo_fesd.core import gradients, is_generated, variables_below
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -48,7 +48,7 @@ def scale_by_values(block, least: float = 1e-3) -> int:
 def _factors(block, least):
     """Factors of the variables and equations that have none."""
     find = SuffixFinder(NAME, None, block.model()).find
-    variables = list(_variables(block))
+    variables = list(variables_below(block))
     free = (v for v in variables if v.value and not v.fixed)
     new = ComponentMap((v, 1 / max(abs(v.value), least)) for v in _unscaled(free, find))
     factors = {id(v): new.get(v) or find(v) or 1.0 for v in variables}
@@ -57,12 +57,6 @@ def _factors(block, least):
     _warn_without_value([c for c, factor in zip(equations, found) if isnan(factor)])
     new.update((c, factor) for c, factor in zip(equations, found) if factor > 0)
     return new
-
-
-def _variables(block):
-    """The variables of a block and of References in it; in a whole model they only name variables again."""
-    whole = block.model() is block
-    return own_data(block, Var, Block) if whole else block.component_data_objects(Var, descend_into=Block)
 
 
 def _unscaled(datas, find):
