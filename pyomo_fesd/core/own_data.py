@@ -13,7 +13,11 @@ from pyomo.core import Block, Var
 def own_data(block: Block, ctype, descend_into, active: bool | None = None) -> Iterator:
     """Yield the data of the components of type ``ctype`` that are no References; the parameters are those of Pyomo's walks."""
     for component in block.component_objects(ctype, active=active, descend_into=descend_into):
-        if not component.is_reference():
+        if not component.is_indexed():
+            # of a flowsheet over time most are scalar; ``values`` takes three times as long
+            if len(component):
+                yield component
+        elif not component.is_reference():
             yield from component.values()
 
 
