@@ -38,10 +38,10 @@ LEAST, BEYOND, LONGER = (1e-2, 1e-4), {'lpec': 'full', 'relaxation': 'elastic'},
 class ElementSolver:
     """Solves the elements of one moving grid in their order; errors say the ``progress``."""
 
-    def __init__(self, model, wrt, inputs, options, timer, progress: Progress):
-        self._model, self._first, self._options, self._timer = model, wrt.first(), options, timer
-        self._times, self._progress = TimeIndex(wrt), progress
-        self._moving = moving_grids(model)[wrt]
+    def __init__(self, model, times: TimeIndex, inputs, options, timer, progress: Progress):
+        self._model, self._first, self._options, self._timer = model, times.wrt.first(), options, timer
+        self._times, self._progress = times, progress
+        self._moving = moving_grids(model)[times.wrt]
         self._grid, self._hysteresis = self._moving.grid, read_hysteresis(self._moving)
         self._jumps = JumpEvents(self._moving.state_jumps)
         has_contacts = self._moving.state_jumps is not None and self._moving.state_jumps.impacts is not None

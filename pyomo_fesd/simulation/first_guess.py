@@ -3,11 +3,12 @@
 from pyomo.common.timing import HierarchicalTimer
 from pyomo.core import Block, Objective
 
-from pyomo_fesd.core import kept_values, moving_grids, phase
+from pyomo_fesd.core import TimeIndex, kept_values, moving_grids, phase
 from pyomo_fesd.mpcc import Deadline
 from pyomo_fesd.simulation.passes import Simulation
 from pyomo_fesd.simulation.simulate import states_fixed_later
 from pyomo_fesd.simulation.static_equations import solve_static_equations
+from pyomo_fesd.simulation.timeless_equations import timeless_equations
 from pyomo_fesd.solvers import register_simulation
 
 
@@ -30,8 +31,9 @@ def simulate_first(model: Block, demanded: bool, timer: HierarchicalTimer, secon
     if not demanded and not _is_a_simulation(model, wrt):
         return False
     with phase(timer, 'simulate'), kept_values(states_fixed_later(model, wrt)):
-        solve_static_equations(model, wrt)
-        Simulation(model, wrt, [], {}, timer, Deadline.after(seconds)).run()
+        times = TimeIndex(wrt)
+        solve_static_equations(timeless_equations(model, times), times)
+        Simulation(model, times, [], {}, timer, Deadline.after(seconds)).run()
     return True
 
 

@@ -36,7 +36,7 @@ class NewtonSystem:
         i, j = row[residuals.rows], column[residuals.columns]
         self._entries = np.flatnonzero((i >= 0) & (j >= 0))
         self._i, self._j = i[self._entries], j[self._entries]
-        self._flat = self._i * n + self._j
+        self._flat, self._matrices = self._i * n + self._j, _Matrices(self._i, self._j, self._shape)
 
     def solve(self, w: np.ndarray) -> np.ndarray | None:
         """Return a zero near ``w``; None if the method does not converge."""
@@ -74,16 +74,38 @@ class NewtonSystem:
         return lapack.dgetrs(factors, pivots, residual)[0]
 
     def _sparse(self, entries, residual):
-        m, n = self._shape
-        M = sparse.csc_matrix((entries, (self._i, self._j)), shape=(m, n))
-        M.eliminate_zeros()
-        if structural_rank(M) < n:
-            # SuperLU may write beyond its memory
+        M = self._matrices.of(entries)
+        if M is None:
             return None
         try:
-            return _least_squares(M, residual) if m > n else splu(M).solve(residual)
+            return _least_squares(M, residual) if M.shape[0] > M.shape[1] else splu(M).solve(residual)
         except RuntimeError:
             return None
+
+
+class _Matrices:
+    """Sparse matrices with entries at the places ``i`` and ``j``: what does not depend on their values is found once."""
+
+    def __init__(self, i: np.ndarray, j: np.ndarray, shape: tuple[int, int]):
+        self._order = np.lexsort((i, j))
+        self._i, self._j, self._shape = i[self._order], j[self._order], shape
+        self._present, self._matrix = None, None
+
+    def of(self, entries: np.ndarray) -> sparse.csc_matrix | None:
+        """Return the matrix, without zeros and valid until the next call; None if its columns are dependent by their places."""
+        entries = entries[self._order]
+        present = entries != 0
+        if not np.array_equal(present, self._present):
+            self._present, self._matrix = present, self._with_places(present)
+        if self._matrix is not None:
+            self._matrix.data = entries[present]
+        return self._matrix
+
+    def _with_places(self, present):
+        """A matrix with entries at some of the places; None where SuperLU may write beyond its memory."""
+        ends = np.searchsorted(self._j[present], np.arange(self._shape[1] + 1))
+        M = sparse.csc_matrix((np.ones(ends[-1]), self._i[present], ends), shape=self._shape)
+        return None if structural_rank(M) < self._shape[1] else M
 
 
 def _least_squares(M, residual):

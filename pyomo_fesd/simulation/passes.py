@@ -9,7 +9,7 @@ import logging
 from pyomo.core import Block, Var
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import FesdError, moving_grids, phase
+from pyomo_fesd.core import FesdError, moving_grids, own_data, phase
 from pyomo_fesd.finite_elements import refuse_first_mode
 from pyomo_fesd.simulation.element_solver import CUT, ElementSolver
 from pyomo_fesd.simulation.progress import Progress, TooFewElements, accumulation
@@ -27,15 +27,15 @@ SHORT_INTERVAL = (
 
 
 class Simulation:
-    """Element-by-element simulation on one moving grid; parameters as of ``simulate``, and a Deadline."""
+    """Element-by-element simulation on one moving grid; parameters as of ``simulate``, with a TimeIndex and a Deadline."""
 
-    def __init__(self, model, wrt, inputs, options, timer, deadline):
+    def __init__(self, model, times, inputs, options, timer, deadline):
         self._model, self._timer = model, timer
-        self._moving = moving_grids(model)[wrt]
+        self._moving = moving_grids(model)[times.wrt]
         _refuse_sticking(self._moving.state_jumps)
         self._grid = self._moving.grid
-        self._progress = Progress(wrt, self._grid.stages, deadline)
-        self._solver = ElementSolver(model, wrt, inputs, options, timer, self._progress)
+        self._progress = Progress(times.wrt, self._grid.stages, deadline)
+        self._solver = ElementSolver(model, times, inputs, options, timer, self._progress)
         self._simulated, self._warm = {}, False
 
     def run(self) -> None:
@@ -46,13 +46,11 @@ class Simulation:
         self._fit_elements()
         if equilibration_is_active(self._moving):
             # another pass with the same plan may find other switches: it begins from other values
-            fitted, events = [(v, v.value, v.stale) for v in self._variables()], self._progress.events
+            variables = own_data(self._model.model(), Var, (Block, Disjunct))
+            fitted, events = [(v, v.value, v.stale) for v in variables], self._progress.events
             if not self._equalise():
                 self._put_back(fitted, events)
         self._warn_of_short_intervals()
-
-    def _variables(self):
-        return self._model.component_data_objects(Var, descend_into=(Block, Disjunct))
 
     def _put_back(self, fitted, events):
         for v, number, stale in fitted:

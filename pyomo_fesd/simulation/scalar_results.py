@@ -13,8 +13,8 @@ import logging
 
 from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Constraint
+from pyomo.core.base.constraint import ConstraintData
 from pyomo.core.expr.visitor import identify_variables
-from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity
 from pyomo.util.calc_var_value import calculate_variable_from_constraint
 
@@ -23,12 +23,11 @@ from pyomo_fesd.core import TimeIndex, is_generated, moving_grids, read_compleme
 logger = logging.getLogger('pyomo_fesd')
 
 
-def evaluate_scalars(model: Block, wrt: ContinuousSet) -> None:
-    """Set the variables without time that are defined by the solution."""
-    for instant in moving_grids(model)[wrt].instants.values():
+def evaluate_scalars(model: Block, times: TimeIndex, equations: list[ConstraintData]) -> None:
+    """Set the variables without time that the solution defines by timeless ``equations``."""
+    for instant in moving_grids(model)[times.wrt].instants.values():
         instant.place()
-    times = TimeIndex(wrt)
-    waiting = _without(ComponentSet(), {c: _open(c, times) for c in _scalar_equations(model, times)})
+    waiting = _without(ComponentSet(), {c: _open(c, times) for c in equations})
     if waiting:
         waiting = _without(_variables_over_time(model, times), waiting)
     while ready := next((c for c, free in waiting.items() if len(free) == 1), None):
@@ -40,13 +39,6 @@ def evaluate_scalars(model: Block, wrt: ContinuousSet) -> None:
 def _without(known, waiting):
     """The equations with the variables that are still open."""
     return {c: free - known for c, free in waiting.items() if free - known}
-
-
-def _scalar_equations(model, times):
-    """Equations of the user without a time of their own that contain variables over time or follow from such."""
-    for c in model.component_data_objects(Constraint, active=True, descend_into=Block):
-        if times.time(c) is None and c.equality and not is_generated(c):
-            yield c
 
 
 def _open(equation, times):

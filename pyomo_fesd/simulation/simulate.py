@@ -38,6 +38,7 @@ from pyomo_fesd.simulation.inputs import read_inputs
 from pyomo_fesd.simulation.passes import Simulation
 from pyomo_fesd.simulation.scalar_results import evaluate_scalars
 from pyomo_fesd.simulation.static_equations import solve_static_equations
+from pyomo_fesd.simulation.timeless_equations import timeless_equations
 
 
 @interruptible
@@ -82,15 +83,17 @@ def simulate(
     inputs = read_inputs(inputs, wrt)
     deadline = Deadline.after(known(options).time_limit)
     options.pop('time_limit', None)
-    solve_static_equations(model, wrt)
     timer = timer or HierarchicalTimer()
-    with kept_values(states_fixed_later(model, wrt)), phase(timer, 'simulate'), PauseGC():
+    with PauseGC(), kept_values(states_fixed_later(model, wrt)), phase(timer, 'simulate'):
         with phase(timer, 'read'):
-            simulation = Simulation(model, wrt, inputs, options, timer, deadline)
+            times = TimeIndex(wrt)
+            timeless = timeless_equations(model, times)
+            solve_static_equations(timeless, times)
+            simulation = Simulation(model, times, inputs, options, timer, deadline)
         with phase(timer, 'march'):
             simulation.run()
         with phase(timer, 'review'):
-            evaluate_scalars(model, wrt)
+            evaluate_scalars(model, times, timeless)
             set_indicators(model)
             diagnose(model)
         with phase(timer, 'trajectory'):

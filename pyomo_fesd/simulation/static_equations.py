@@ -1,6 +1,6 @@
 """Solve equations without time before the simulation, such as an area that follows from a diameter.
 
-Takes: a model; the present values of its other variables without time are given.
+Takes: equations without time; the present values of its other variables without time are given.
 Leaves: values of the variables that these equations determine.
 Does not apply: to equations that hold already, and to equations that contain a variable over time.
 """
@@ -8,27 +8,26 @@ Does not apply: to equations that hold already, and to equations that contain a 
 from pyomo.common.collections import ComponentSet
 from pyomo.contrib.solver.common.factory import SolverFactory
 from pyomo.contrib.solver.common.results import SolutionStatus
-from pyomo.core import Block, Constraint, value
+from pyomo.core import value
+from pyomo.core.base.constraint import ConstraintData
 from pyomo.core.expr.visitor import identify_variables
-from pyomo.dae import ContinuousSet
 from pyomo.util.subsystems import create_subsystem_block
 
-from pyomo_fesd.core import FesdError, TimeIndex, is_generated
+from pyomo_fesd.core import FesdError, TimeIndex
 
 #: An equation holds if its residual is smaller, relative to max(1, |body|).
 HOLDS = 1e-10
 
 
-def solve_static_equations(model: Block, wrt: ContinuousSet) -> None:
-    """Solve the equations without time if they do not hold.
+def solve_static_equations(equations: list[ConstraintData], times: TimeIndex) -> None:
+    """Solve those of the timeless ``equations`` that contain no variable over time, if they do not hold.
 
     Raises
     ------
     FesdError
         naming an equation that cannot be solved
     """
-    times = TimeIndex(wrt)
-    rows = [c for c in model.component_data_objects(Constraint, active=True, descend_into=Block) if _is_static(c, times)]
+    rows = [c for c in equations if _is_static(c, times)]
     unknowns = ComponentSet(v for c in rows for v in identify_variables(c.body, include_fixed=False))
     if all(map(_holds, rows)):
         return
@@ -45,9 +44,6 @@ def solve_static_equations(model: Block, wrt: ContinuousSet) -> None:
 
 
 def _is_static(equation, times):
-    # most equations are over time, and this is the cheapest question
-    if times.time(equation) is not None or not equation.equality or is_generated(equation):
-        return False
     variables = list(identify_variables(equation.body, include_fixed=True))
     return all(times.time(v) is None for v in variables) and any(not v.fixed for v in variables)
 

@@ -62,8 +62,12 @@ class CasadiSolver(SolverBase):
         found = results.solution_loader.get_number_of_solutions()
         loads = bool(results.solver_config.load_solutions and found and not _raises(results))
         if loads:
-            results.solution_loader.load_solution()
+            self._load_from(results.solution_loader)
         return loads
+
+    @staticmethod
+    def _load_from(loader):
+        loader.load_solution()
 
     def _refuse_nonoptimal(self, results, message):
         """Raise if the options say so."""
@@ -120,6 +124,11 @@ class LegacyPlugin(LegacySolverWrapper):
         check_keywords(self.config, own | meant, self.name)
         self.config.set_value(own)
         return kwds
+
+    @staticmethod
+    def _load_from(loader):
+        # Pyomo's wrapper loads the multipliers, which takes a walk through all blocks
+        loader.load_vars()
 
     def _map_results(self, model, results):
         legacy, solution = super()._map_results(model, results)

@@ -14,7 +14,7 @@ import numpy as np
 from pyomo.core import Block, Var
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import FesdError, moving_grids, withheld_messages
+from pyomo_fesd.core import FesdError, moving_grids, own_data, withheld_messages
 from pyomo_fesd.mpcc import Deadline
 from pyomo_fesd.solvers.drawn_controls import draw_controls, refuse_without_controls
 
@@ -161,8 +161,7 @@ class SimulatedStart:
         return found
 
     def _remember(self):
-        variables = self._model.component_data_objects(Var, descend_into=(Block, Disjunct))
-        self._before = [(v, v.value, v.stale) for v in variables]
+        self._before = [(v, v.value, v.stale) for v in own_data(self._model, Var, (Block, Disjunct))]
 
     def reason(self, refused: str) -> str:
         """Return what a run that failed saw of this start; ``refused`` says why it is no solution."""

@@ -1,13 +1,21 @@
 """Refuse models that are not ready for a solver: active components that it would ignore, and a time that is not discretised."""
 
-from pyomo.core import Block, LogicalConstraint, SOSConstraint, Var
+from pyomo.core import Block, LogicalConstraint, SOSConstraint
 from pyomo.core.expr.compare import compare_expressions
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import DerivativeVar, Integral
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import FesdError, all_switched_systems, continuous_sets, discretised, moving_grids, refuse_no_model
+from pyomo_fesd.core import (
+    FesdError,
+    all_switched_systems,
+    continuous_sets,
+    discretised,
+    moving_grids,
+    refuse_no_model,
+    variables_below,
+)
 from pyomo_fesd.finite_elements import refuse_first_modes
 
 #: Components that must not be active -> fix.
@@ -35,7 +43,7 @@ def refuse_unready(model: Block, solver: str) -> None:
         _refuse_first(model, solver)
     for integral in model.component_objects(Integral, active=True, descend_into=Block):
         _refuse_stale(integral, solver)
-    for v in model.component_data_objects(Var, active=True, descend_into=Block):
+    for v in variables_below(model, active=True):
         if not v.fixed and not v.is_continuous():
             raise FesdError(v, f"an integer variable, which {solver} does not decide", INTEGERS)
     grids = moving_grids(model)

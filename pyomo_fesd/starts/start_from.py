@@ -27,7 +27,7 @@ from pyomo_fesd.core import (
     refuse_no_model,
 )
 from pyomo_fesd.results import columns_over_time, trajectory
-from pyomo_fesd.simulation import evaluate_scalars
+from pyomo_fesd.simulation import evaluate_scalars, timeless_equations
 from pyomo_fesd.starts.boundary_values import set_hysteresis, set_jumps
 from pyomo_fesd.starts.consistent_values import make_consistent
 from pyomo_fesd.starts.element_placement import check_horizon, free_durations, place_elements, set_within_bounds
@@ -86,7 +86,8 @@ def start_from(model: Block, source: pd.DataFrame | Block, wrt: ContinuousSet | 
             set_within_bounds(v, number)
         place_elements(moving, table)
         _set_values(model, moving, table, columns)
-        evaluate_scalars(model, wrt)
+        times = TimeIndex(wrt)
+        evaluate_scalars(model, times, timeless_equations(model, times))
 
 
 def _table_of(source, model, wrt, columns):

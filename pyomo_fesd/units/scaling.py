@@ -14,11 +14,12 @@ import logging
 from math import isnan, nan
 
 from pyomo.common.collections import ComponentMap
-from pyomo.core import Block, Constraint, Suffix, Var
+from pyomo.common.gc_manager import PauseGC
+from pyomo.core import Block, Constraint, Suffix
 from pyomo.core.base.suffix import SuffixFinder
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import gradients, is_generated
+from pyomo_fesd.core import gradients, is_generated, variables_below
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -37,8 +38,17 @@ def scale_by_values(block, least: float = 1e-3) -> int:
     least : float
         smallest magnitude of a variable that is not zero
     """
+    with PauseGC():
+        new = _factors(block, least)
+        for component, factor in new.items():
+            _set_factor(component, factor)
+    return len(new)
+
+
+def _factors(block, least):
+    """Factors of the variables and equations that have none."""
     find = SuffixFinder(NAME, None, block.model()).find
-    variables = list(block.component_data_objects(Var, descend_into=Block))
+    variables = list(variables_below(block))
     free = (v for v in variables if v.value and not v.fixed)
     new = ComponentMap((v, 1 / max(abs(v.value), least)) for v in _unscaled(free, find))
     factors = {id(v): new.get(v) or find(v) or 1.0 for v in variables}
@@ -46,13 +56,18 @@ def scale_by_values(block, least: float = 1e-3) -> int:
     found = [_equation_factor(*slopes, factors) for slopes in gradients(c.body for c in equations)]
     _warn_without_value([c for c, factor in zip(equations, found) if isnan(factor)])
     new.update((c, factor) for c, factor in zip(equations, found) if factor > 0)
-    for component, factor in new.items():
-        _set_factor(component, factor)
-    return len(new)
+    return new
 
 
-def _unscaled(components, find):
-    return (c for c in components if find(c) is None and not is_generated(c))
+def _unscaled(datas, find):
+    """Data of the user without a factor."""
+    generated = ComponentMap()
+    for data in datas:
+        component = data.parent_component()
+        if component not in generated:
+            generated[component] = is_generated(component)
+        if not generated[component] and find(data) is None:
+            yield data
 
 
 def _equation_factor(variables, slopes, factors):

@@ -13,7 +13,7 @@ from pyomo_fesd.simulation.progress import Progress
 def sizes(m):
     """The sizes that a simulation of ``m`` begins with."""
     moving = moving_grids(m)[m.t]
-    solver = ElementSolver(m, m.t, (), {}, HierarchicalTimer(), Progress(m.t, moving.grid.stages, None))
+    solver = ElementSolver(m, TimeIndex(m.t), (), {}, HierarchicalTimer(), Progress(m.t, moving.grid.stages, None))
     solver._learn_sizes()
     return solver._sizes
 
