@@ -28,7 +28,7 @@ from pyomo_fesd.results import set_indicators
 from pyomo_fesd.solvers.plugin import CasadiSolver, LegacyPlugin, deadline, with_structure
 from pyomo_fesd.solvers.singular_start import with_perturbation
 from pyomo_fesd.solvers.stand_in import ExecutableKeywords, LegacyExecutableKeywords, Replacement
-from pyomo_fesd.solvers.unready_models import refuse_unready
+from pyomo_fesd.solvers.unready_models import refuse_integers, refuse_unready
 from pyomo_fesd.solvers.user_names import user_names
 
 logger = logging.getLogger('pyomo_fesd')
@@ -119,6 +119,7 @@ class CasadiIpopt(CasadiSolver):
                 compiled = compile_mpcc(
                     problem, config.timer, config.working_dir, user_scaling=scaled, check=until.check, conditions=True
                 )
+                refuse_integers(compiled.variables, NAME)
         except (Contradiction, OutOfTime) as error:
             late = isinstance(error, OutOfTime)
             _conclude(results, *(TOO_LATE if late else ('Fixed values contradict', str(error))))

@@ -2,7 +2,7 @@
 
 from pyomo_fesd.core import FesdError
 from pyomo_fesd.mpcc import Contradiction, Deadline, Snapshot, SolverCache, compile_mpcc, parameter_data, read_mpcc
-from pyomo_fesd.solvers.unready_models import refuse_unready
+from pyomo_fesd.solvers.unready_models import refuse_integers, refuse_unready
 
 
 class PersistentModel:
@@ -44,6 +44,7 @@ class PersistentModel:
         self.deadline.check()
         settings = options.user_scaling, options.natural_units
         self.compiled = compile_mpcc(problem, timer, options.working_dir, datas, *settings, self.deadline.check)
+        refuse_integers(self.compiled.variables, 'mpec_hybrid')
         self._problem, self._parameters, self._snapshot = problem, datas, None
         self.cache = SolverCache(self.compiled)
 

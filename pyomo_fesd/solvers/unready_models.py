@@ -29,6 +29,16 @@ REFUSED = {
 INTEGERS = "pyomo_fesd.decide_integers solves for its values one after the other; or fix it, or relax its domain"
 
 
+def refuse_integers(variables, solver: str) -> None:
+    """Refuse free integer variables.
+
+    Those that a solver has read may lie where ``refuse_unready`` does not look, such as on a block that is not active.
+    """
+    for v in variables:
+        if not v.is_continuous():
+            raise FesdError(v, f"an integer variable, which {solver} does not decide", INTEGERS)
+
+
 def refuse_unready(model: Block, solver: str) -> None:
     """Check that ``solver`` (its name) can solve ``model``.
 
@@ -43,9 +53,7 @@ def refuse_unready(model: Block, solver: str) -> None:
         _refuse_first(model, solver)
     for integral in model.component_objects(Integral, active=True, descend_into=Block):
         _refuse_stale(integral, solver)
-    for v in variables_below(model, active=True):
-        if not v.fixed and not v.is_continuous():
-            raise FesdError(v, f"an integer variable, which {solver} does not decide", INTEGERS)
+    refuse_integers((v for v in variables_below(model, active=True) if not v.fixed), solver)
     grids = moving_grids(model)
     for component, kind in _need_moving_elements(model):
         if not any(wrt in grids for wrt in continuous_sets(component)):

@@ -1,7 +1,10 @@
 """Coinciding switches: every order of them is tried before a point is certified."""
 
+import numpy as np
+import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
+from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity
 
 import pyomo_fesd
@@ -109,14 +112,52 @@ def test_certify_looks_at_the_orders_too():
     assert pyomo_fesd.certify(m).certified
 
 
-@pytest.mark.parametrize('number', [2, 3])
 @pytest.mark.parametrize('common', [lambda theta: theta, lambda theta: theta * (theta + 1) / 2])
-def test_equal_systems_stay_together_and_are_certified(common, number):
+def test_two_equal_systems_stay_together_and_are_certified(common):
+    assert solved(equal_systems(common, 2), warm_start=True)[1] == 'B'
+
+
+def test_more_equal_systems_are_not_certified_as_two_places_are_not_inserted_at_once():
+    # the point is a minimum: this is a limit
+    results = pyo.SolverFactory('mpec_hybrid').solve(equal_systems(lambda theta: theta, 3), warm_start=True)
+    assert results.solver.stationarity == 'not certified' and 'order' in results.solver.reason
+
+
+def equal_systems(common, number):
+    """Equal systems, of which none switches first."""
     m = two_experiments.build(0.6, (common,) * number)
     m.misfit.set_value(m.misfit.expr + 0.1 * (m.theta - 1) ** 2)  # so that the objective has a slope
     transform(m, 3)
     simulated(m, 0.6)
-    assert solved(m, warm_start=True)[1] == 'B'
+    return m
+
+
+@pytest.mark.parametrize('number', [3, 4])
+@pytest.mark.parametrize('seed', range(3))
+def test_three_switches_at_one_time_are_not_certified_where_a_slope_descends(number, seed):
+    # each switch has its own time for another theta, so that no two of them stay together
+    random = np.random.default_rng(seed)
+    q, s, w = random.uniform(-1, 1, number), random.uniform(0.2, 3, number), random.uniform(-1, 1, number)
+    assert abs(sum(w * q * (1 - s))) > 5e-3  # the slope of the objective by theta
+    m = pyo.ConcreteModel()
+    m.t, m.i = dae.ContinuousSet(bounds=(0, 2)), pyo.RangeSet(number)
+    m.theta = pyo.Var(bounds=(0.5, 1.5), initialize=1)
+    m.x, m.v = pyo.Var(m.t, m.i, initialize=0), pyo.Var(m.t, m.i, initialize=1)
+    m.dx = dae.DerivativeVar(m.x, wrt=m.t)
+    m.x[0, :].fix(0)
+    m.rate = pyo.Constraint(m.t, m.i, rule=lambda m, t, i: m.dx[t, i] == m.v[t, i])
+
+    def law(m, t, i):
+        level = 1 + q[i - 1] * (m.theta - 1)
+        return [[m.x[t, i] <= level, m.v[t, i] == 1], [m.x[t, i] >= level, m.v[t, i] == s[i - 1]]]
+
+    m.law = Disjunction(m.t, m.i, rule=law)
+    m.cost = pyo.Objective(expr=sum(w[i - 1] * m.x[2, i] for i in m.i))
+    transform(m, 6)
+    m.theta.fix(1)
+    pyomo_fesd.simulate(m)
+    m.theta.unfix()
+    assert not pyomo_fesd.certify(m).certified
 
 
 @pytest.mark.parametrize('warm_start', [True, False])

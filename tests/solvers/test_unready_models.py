@@ -92,6 +92,22 @@ def test_a_fixed_integer_is_not_refused():
     refuse_unready(m, 'some_solver')
 
 
+@pytest.mark.parametrize('solver', ['mpec_hybrid', 'casadi_ipopt'])
+@pytest.mark.parametrize('referred', [False, True])
+def test_an_integer_of_an_inactive_block_is_refused_if_an_equation_contains_it(referred, solver):
+    m = pyo.ConcreteModel()
+    m.b = pyo.Block()
+    m.b.n = pyo.Var([1], domain=pyo.Integers, bounds=(0, 3), initialize=1)
+    m.b.deactivate()
+    m.x = pyo.Var(initialize=1.0)
+    if referred:
+        m.n = pyo.Reference(m.b.n)
+    m.c = pyo.Constraint(expr=m.x == 0.5 * m.b.n[1])
+    m.cost = pyo.Objective(expr=(m.x - 0.7) ** 2)
+    with pytest.raises(FesdError, match=r'^b.n\[1\].*integer'):
+        pyo.SolverFactory(solver).solve(m)
+
+
 def test_a_plain_model_is_ready():
     refuse_unready(model(), 'some_solver')
 

@@ -10,6 +10,7 @@ the end (``arrivals``).
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import permutations
 
 import numpy as np
 
@@ -32,15 +33,43 @@ SETTLED, OPEN, ABSENT = 'settled', 'open', 'absent'
 
 @dataclass(frozen=True)
 class _Order:
-    """An order of changes: equivalent ways to it, and functions that return the ``Verdict`` of an inserted place."""
+    """An order of changes: equivalent ways to it, and functions that return the ``Verdict`` of an inserted place.
+
+    ``place`` is what the inserted place holds; None at an end of a row.
+    """
 
     ways: list
     judges: list
+    place: '_Inserted | None' = None
 
     @property
     def key(self):
         """Equal for orders with the same branches."""
         return tuple((way.extents.tobytes(), way.zero.tobytes()) for way in self.ways) or id(self)
+
+
+@dataclass(frozen=True)
+class _Inserted:
+    """What a place inserted at a coincidence holds.
+
+    ``happened`` are the numbers of the changes that have happened there, and ``side`` is 0 before a boundary that stays where it
+    is, 1 behind it or where there is none.
+    """
+
+    coincidence: object
+    side: int
+    happened: frozenset
+
+    @classmethod
+    def of(cls, coincidence, side, changes):
+        """The place in which ``changes`` have happened."""
+        return cls(coincidence, side, frozenset(map(coincidence.changes.index, changes)))
+
+    def precedes(self, other):
+        """Whether the other can follow it: one more place of the same coincidence, with no change undone."""
+        if self == other or self.coincidence is not other.coincidence or self.side > other.side:
+            return False
+        return self.happened <= other.happened
 
 
 class Coincidences:
@@ -108,24 +137,30 @@ class Coincidences:
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)
         if self._holds_anything(point.w, sets):
             return OPEN
+        possible = []
         for order in self._orders(point, sets):
             if order.key in tried:
                 continue
             tried.add(order.key)
-            found = self._order(point, order)
+            found = self._order(point, order, possible)
             if found is OPEN:
                 outcome = OPEN
             elif found is not SETTLED:
                 return found
-        return outcome
+        # an order that takes two places more has none of them where one alone is inserted, and the other changes stay together
+        return OPEN if any(one.precedes(other) for one, other in permutations(possible, 2)) else outcome
 
-    def _order(self, point, order):
-        """A better point in an order; or its outcome."""
+    def _order(self, point, order, possible):
+        """A better point in an order; or its outcome.  What it inserts is appended to ``possible`` if that is possible."""
         verdicts = set()
         for judge in order.judges:
             verdicts.add(judge())
             if verdicts & {Verdict.IMPOSSIBLE, Verdict.NO_DESCENT}:
-                return SETTLED
+                break
+        if order.place is not None and not verdicts <= {Verdict.IMPOSSIBLE, Verdict.NONE}:
+            possible.append(order.place)
+        if verdicts & {Verdict.IMPOSSIBLE, Verdict.NO_DESCENT}:
+            return SETTLED
         inserts = bool(verdicts - {Verdict.NONE})
         found = self._first(partial(self._try, point, inserts), order.ways)
         if found is SETTLED and Verdict.DESCENT in verdicts:
@@ -162,14 +197,17 @@ class Coincidences:
             present = [change for change in coincidence.changes if _differs(change, at)]
             for some in _subsets(present, coincidence.fixed):
                 rest = [change for change in present if change not in some]
-                moves = (inserted.later, some), (inserted.earlier, some if coincidence.fixed else rest)
-                judges = [partial(judge, coincidence, moved, present) for judge, moved in moves if at is sets]
+                moved = some if coincidence.fixed else rest
+                moves = (inserted.later, some), (inserted.earlier, moved)
+                judges = [partial(judge, coincidence, those, present) for judge, those in moves if at is sets]
                 later = (coincidence.later, _moved(at.zero, [c.later for c in some]))
+                earlier = (coincidence.earlier, _moved(at.zero, [c.earlier for c in moved]))
+                before, after = (_Inserted.of(coincidence, side, happened) for side, happened in enumerate((some, rest)))
                 if coincidence.fixed:
-                    yield _Order(_possible(w, later), judges[:1])
-                    yield _Order(_possible(w, (coincidence.earlier, _moved(at.zero, [c.earlier for c in some]))), judges[1:])
+                    yield _Order(_possible(w, later), judges[:1], after)
+                    yield _Order(_possible(w, earlier), judges[1:], before)
                 else:
-                    yield _Order(_possible(w, later, (coincidence.earlier, _moved(at.zero, [c.earlier for c in rest]))), judges)
+                    yield _Order(_possible(w, later, earlier), judges, after)
         for entered, changed in branches(self._c, w, sets, self._tolerances.biactive):
             judges = [partial(inserted.entered, entered), partial(inserted.at_end, changed)]
             yield _Order([] if entered is None else [entered], judges)
