@@ -44,8 +44,8 @@ class _Order:
 
     @property
     def key(self):
-        """Equal for orders with the same branches."""
-        return tuple((way.extents.tobytes(), way.zero.tobytes()) for way in self.ways) or id(self)
+        """Equal for orders with the same branches; empty without one."""
+        return tuple((way.extents.tobytes(), way.zero.tobytes()) for way in self.ways)
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class Coincidences:
             return OPEN
         possible = []
         for order in self._orders(point, sets):
-            if order.key in tried:
+            if order.key and order.key in tried:
                 continue
             tried.add(order.key)
             found = self._order(point, order, possible)
