@@ -61,7 +61,7 @@ from pyomo_fesd.core.phase import phase
 from pyomo_fesd.core.positive_part import add_positive_part, declare_positive_part
 from pyomo_fesd.core.private_data import records_below, remember_records
 from pyomo_fesd.core.renamed import Renamed
-from pyomo_fesd.core.rollback import restored_on_error
+from pyomo_fesd.core.rollback import restored, restored_on_error
 from pyomo_fesd.core.smallest import add_smallest, declare_smallest
 from pyomo_fesd.core.step import add_step, declare_step
 from pyomo_fesd.core.structural_key import StructuralKey, any_number, exactly, nine_digits, variables_of

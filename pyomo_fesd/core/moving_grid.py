@@ -76,6 +76,8 @@ class MovingGrid(AutoSlots.Mixin):
     hysteresis : Hysteresis or None
     instants : dict
         physical time -> ``Instant``
+    begin : float or None
+        physical time at which the first element begins, where that is not the first label: elements that march along
     """
 
     __slots__ = (
@@ -100,6 +102,7 @@ class MovingGrid(AutoSlots.Mixin):
         'state_jumps',
         'hysteresis',
         'instants',
+        'begin',
     )
 
     def __init__(self, wrt: ContinuousSet, block: Block, grid: Grid):
@@ -149,14 +152,14 @@ class MovingGrid(AutoSlots.Mixin):
         return time
 
     def physical_time(self) -> dict[float, float]:
-        """Return the physical time of every label (eq. 9 and 10), in order of time."""
+        """Return the physical time of every label of the elements (eq. 9 and 10), in order of time."""
         first = self.wrt.first()
-        time = {first: float(first)}
+        time = {first: float(first if self.begin is None else self.begin)}
         for element in self.grid.elements:
             left, h = time[element.left], value(self.duration(element))
             time.update((label, left + c * h) for label, c in zip(element.points, self.grid.tau))
             time[element.right] = left + h
-        return {label: time[label] for label in self.wrt}
+        return {label: time[label] for label in self.wrt if label in time}
 
 
 class _MovingGrids(AutoSlots.Mixin):

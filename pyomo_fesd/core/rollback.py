@@ -1,4 +1,4 @@
-"""Restore the model as it was before a step that failed.
+"""Restore the model as it was before a step that failed, or that needs other points for a while only.
 
 Each function ``_remember_...`` records one aspect of the model and returns the function that restores it.
 """
@@ -36,21 +36,33 @@ def restored_on_error(block: Block, wrt: ContinuousSet | None = None) -> Iterato
     wrt : ContinuousSet, optional
         to which the body may add points
     """
-    model = block.model()
-    with DeferredInterrupt() as interrupt, ExitStack() as undo:
-        # in reverse order of the restoration
-        undo.callback(_remember_types(model))
-        if wrt is not None:
-            undo.callback(_remember_points(wrt))
-        undo.callback(remember_records(model))
-        undo.callback(_remember_active(model))
-        undo.callback(_remember_indices(model))
-        undo.callback(_remember_values(model))
-        undo.callback(_remember_components(model))
-        undo.callback(_remember_statements(model))
+    with DeferredInterrupt() as interrupt, _remembered(block.model(), wrt) as undo:
         with interrupt.raising():
             yield
         undo.pop_all()
+
+
+@contextmanager
+def restored(block: Block, wrt: ContinuousSet | None = None) -> Iterator[None]:
+    """Restore the model after the body, whether it raises or not; see ``restored_on_error``."""
+    with DeferredInterrupt() as interrupt, _remembered(block.model(), wrt), interrupt.raising():
+        yield
+
+
+def _remembered(model, wrt):
+    """The functions that restore the model, called on exit."""
+    undo = ExitStack()
+    # in reverse order of the restoration
+    undo.callback(_remember_types(model))
+    if wrt is not None:
+        undo.callback(_remember_points(wrt))
+    undo.callback(remember_records(model))
+    undo.callback(_remember_active(model))
+    undo.callback(_remember_indices(model))
+    undo.callback(_remember_values(model))
+    undo.callback(_remember_components(model))
+    undo.callback(_remember_statements(model))
+    return undo
 
 
 def _remember_values(model) -> Callable[[], None]:

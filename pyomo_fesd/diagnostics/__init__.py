@@ -7,4 +7,4 @@ grids, and changes nothing on the model.
 """
 
 from pyomo_fesd.diagnostics.missed_crossings import missed_crossings
-from pyomo_fesd.diagnostics.review import diagnose
+from pyomo_fesd.diagnostics.review import MarchReview, diagnose

@@ -4,6 +4,7 @@ import logging
 from functools import cache, partial
 
 from pyomo.core import Block
+from pyomo.dae import ContinuousSet
 
 from pyomo_fesd.core import moving_grids
 from pyomo_fesd.diagnostics.collapsed_elements import collapsed_elements
@@ -26,6 +27,10 @@ CHECKS = {
     'inputs': varied_inputs,
 }
 
+#: Those for elements that march along, in the first round and in all others.
+AT_FIRST = 'uniqueness', 'first modes', 'missed crossings'
+WHILE_MARCHING = 'uniqueness', 'missed crossings'
+
 
 def diagnose(model: Block) -> list[str]:
     """Log warnings about what the certificate does not cover; return the messages.
@@ -41,6 +46,33 @@ def diagnose(model: Block) -> list[str]:
     for message in messages:
         logger.warning(message)
     return messages
+
+
+class MarchReview:
+    """The review of elements that march along: what the first of them begin with, and what each of them may miss.
+
+    A message is logged once.
+
+    Parameters
+    ----------
+    model : Block
+    wrt : ContinuousSet
+    """
+
+    def __init__(self, model: Block, wrt: ContinuousSet):
+        self._model, self._wrt, self._said = model, wrt, set()
+        self._functions = cache(partial(switching_functions, model, wrt))
+        self._checks = AT_FIRST
+
+    def look(self) -> None:
+        """Log warnings about the elements on the grid."""
+        for name in self._checks:
+            for message in _messages(name, CHECKS[name], self._model, self._wrt, self._functions):
+                subject = name, message.partition(':')[0]
+                if subject not in self._said:
+                    self._said.add(subject)
+                    logger.warning(message)
+        self._checks = WHILE_MARCHING
 
 
 def _messages(name, check, model, wrt, functions):

@@ -46,11 +46,11 @@ MOST = 5
 
 def not_unique(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
     """Yield messages for boundaries from which both modes lead away."""
-    grid, time, rates = moving_grids(model)[wrt].grid, None, None
+    moving, time, rates = moving_grids(model)[wrt], None, None
     # those of one Disjunction have the same name
     zeros = {id(s): ZERO * largest_value(s.c) for s in functions}
     for s in functions:
-        for label in _meetings(s, zeros[id(s)], grid, wrt):
+        for label in _meetings(s, zeros[id(s)], moving):
             rates = rates or _Rates(model, wrt)
             if rates.slope(s, s, label) > 0 and _leaves_choices(rates, s, _others(s, functions, zeros, label), label):
                 time = time or physical_time(model, wrt)
@@ -98,15 +98,16 @@ def _is_possible(rest, S, ways):
     return all(SLIDING < nu[i] < 1 - SLIDING for i in kept) and all(leaving[i] > 0 for i in range(len(ways)) if i not in kept)
 
 
-def _meetings(s, zero, grid, wrt):
+def _meetings(s, zero, moving):
     """Labels where c = 0 and either mode is possible: the first time, and where a slide begins."""
-    first, before = wrt.first(), False
-    if first in s.c and abs(value(s.c[first])) <= zero:
+    first, before = moving.wrt.first(), False
+    if moving.begin is None and first in s.c and abs(value(s.c[first])) <= zero:
         yield first
-    for element in grid.elements:
+    for element in moving.grid.elements:
         label = element.points[0]
         slides = label in s.c and SLIDING < s.nu[label].value < 1 - SLIDING and abs(value(s.c[label])) <= zero
-        if slides and not before:
+        # of elements that march along the first has been looked at before
+        if slides and not before and (moving.begin is None or element.n > 1):
             yield label
         before = slides
 

@@ -1,16 +1,22 @@
 """Switches on physical time: changes of the active set, and state jumps."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from pyomo.common.dependencies import pandas as pd
 from pyomo.core import Block, value
 from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import Element, TimeIndex, find_continuous_set, strip_time
+from pyomo_fesd.core import Element, FesdError, TimeIndex, find_continuous_set, strip_time
 from pyomo_fesd.results.complementarity_modes import complementarity_modes, positive_modes, relatively_positive_modes
 from pyomo_fesd.results.disjunction_modes import disjunction_modes, surface_sides
 from pyomo_fesd.results.physical_time import elements, physical_time
 from pyomo_fesd.results.trajectory import jumps_that_happen
+
+#: Where a trajectory of ``simulate`` has its switches, among its ``attrs``.
+SWITCHES = 'switches'
 
 
 class Switch(NamedTuple):
@@ -34,30 +40,79 @@ class Switches(list):
     __str__ = __repr__
 
 
-def switches(model: Block, wrt: ContinuousSet | None = None) -> Switches:
+def switches(model: Block | pd.DataFrame, wrt: ContinuousSet | None = None) -> Switches:
     """Return the times at which a Disjunction, a surface of a piecewise function, or a hand-written Complementarity switches.
 
     An element of a moving grid has one active set (eq. 11), so switches lie on element boundaries.
+
+    Parameters
+    ----------
+    model : Block, or DataFrame that ``simulate`` has returned
+    wrt : ContinuousSet, optional
 
     Returns
     -------
     Switches
         list of ``Switch(time, disjunction, before, after)``
+
+    Raises
+    ------
+    FesdError
+        for a table without switches, as of ``trajectory``
     """
+    if isinstance(model, pd.DataFrame):
+        return _of_table(model)
     wrt = find_continuous_set(model, wrt, 'switches')
     return Switches(switch for _, switch in labelled_switches(model, wrt))
+
+
+def _of_table(table):
+    if SWITCHES not in table.attrs:
+        raise FesdError('switches', "this table has none with it", "pass the one that simulate has returned, or the model")
+    return Switches(Switch(*switch) for switch in table.attrs[SWITCHES])
 
 
 def labelled_switches(model: Block, wrt: ContinuousSet) -> list[tuple[float, Switch]]:
     """Return ``(label, Switch)`` in order of time; the label is that of the element boundary at which it happens."""
     found, index = elements(wrt), TimeIndex(wrt)
     times = physical_time(model, wrt)
-    systems = disjunction_modes(model, index) | complementarity_modes(model, wrt, index) | surface_sides(model, index)
-    changes = [(t, Switch(times[t], name, *both)) for name, modes in systems.items() for t, *both in _changes(modes, found)]
+    systems = _systems(model, wrt, index).items()
+    changes = [(t, Switch(times[t], name, *both)) for name, modes in systems for t, *both in _changes(modes, found)]
     for _, label, name, after in jumps_that_happen(model, wrt):
         before = [(x, value(x)) for x, _ in after]
         changes.append((label, Switch(times[label], name, _state_values(before, index), _state_values(after, index))))
     return sorted(changes, key=lambda change: change[1].time)
+
+
+def _systems(model, wrt, index):
+    """All that switches: ``{name: {mode: {label: expression that is positive there}}}``."""
+    return disjunction_modes(model, index) | complementarity_modes(model, wrt, index) | surface_sides(model, index)
+
+
+class ElementSwitches:
+    """The switches so far, element by element, while the values on the elements change.
+
+    Parameters
+    ----------
+    model : Block
+    index : TimeIndex
+
+    Attributes
+    ----------
+    found : Switches
+    """
+
+    def __init__(self, model: Block, index: TimeIndex):
+        self.found, self._systems, self._modes = Switches(), _systems(model, index.wrt, index), {}
+
+    def add(self, element: Element, left: float) -> None:
+        """Add those at the time ``left`` at which an ``element`` begins."""
+        for name, modes in self._systems.items():
+            active, before = _active_mode(modes, element), self._modes.get(name)
+            if active is not None:
+                self._modes[name] = active
+                if before not in (None, active):
+                    self.found.append(Switch(left, name, before, active))
 
 
 def _changes(modes, found: tuple[Element, ...]) -> Iterator[tuple]:

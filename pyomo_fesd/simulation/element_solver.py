@@ -1,8 +1,9 @@
 """Solve one element after the other, each up to the next switch, the end of a mode with hysteresis, or a state jump."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
-from pyomo_fesd.core import TimeIndex, derivatives, moving_grids, phase
+from pyomo_fesd.core import Element, TimeIndex, derivatives, moving_grids, phase
 from pyomo_fesd.simulation.determinacy import refuse_undetermined, refuse_undetermined_start
 from pyomo_fesd.simulation.element_class import ElementClass, ElementEnd, LeftBoundary
 from pyomo_fesd.simulation.equation_reader import EquationReader
@@ -52,6 +53,10 @@ class ElementSolver:
         given.update(v for some in self._hysteresis for e in self._grid.elements for v in some.variables(e.right))
         self._reader = EquationReader(model, self._moving, self._times, given)
         self._equations, self._classes, self._end = {}, {}, ElementEnd()
+
+    def are_alike(self, elements: Iterable[Element]) -> bool:
+        """Return whether ``elements`` have the same equations."""
+        return len({self._read(element).element_class for element in elements}) == 1
 
     def find_initial_values(self) -> None:
         """Find the values of the first time: algebraic variables, modes, and states that equations there determine."""

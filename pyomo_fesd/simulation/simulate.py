@@ -25,6 +25,7 @@ from pyomo_fesd.core import (
     TimeIndex,
     check_keywords,
     derivatives,
+    discretised,
     find_continuous_set,
     interruptible,
     kept_values,
@@ -32,13 +33,16 @@ from pyomo_fesd.core import (
     phase,
 )
 from pyomo_fesd.diagnostics import diagnose
+from pyomo_fesd.finite_elements import FiniteElements
 from pyomo_fesd.mpcc import Deadline
 from pyomo_fesd.results import set_indicators, trajectory
 from pyomo_fesd.simulation.inputs import read_inputs
+from pyomo_fesd.simulation.marching_elements import MarchingElements
 from pyomo_fesd.simulation.passes import Simulation
 from pyomo_fesd.simulation.scalar_results import evaluate_scalars
 from pyomo_fesd.simulation.static_equations import solve_static_equations
 from pyomo_fesd.simulation.timeless_equations import timeless_equations
+from pyomo_fesd.simulation.without_grid import OPTIONS, WithoutGrid
 
 
 @interruptible
@@ -76,28 +80,72 @@ def simulate(
         they do), a state that is not fixed at the first time, an undetermined variable.  The model has the values up to there.
     """
     wrt = find_continuous_set(model, wrt, 'simulate')
-    if wrt not in moving_grids(model):
-        raise FesdError(wrt, "simulate: its elements are not movable", "apply fesd.finite_elements first")
+    grid = {name: options.pop(name) for name in OPTIONS if name in options}
     known = SolverFactory('mpec_hybrid').CONFIG
     check_keywords(known, options | {'timer': timer}, 'simulate')
-    inputs = read_inputs(inputs, wrt)
+    check_keywords(FiniteElements.CONFIG, grid, 'simulate')
+    _check_grid(wrt, grid)
     deadline = Deadline.after(known(options).time_limit)
     options.pop('time_limit', None)
     timer = timer or HierarchicalTimer()
+    run = _Run(model, wrt, read_inputs(inputs, wrt), options, timer, deadline)
     with PauseGC(), kept_values(states_fixed_later(model, wrt)), phase(timer, 'simulate'):
-        with phase(timer, 'read'):
-            times = TimeIndex(wrt)
-            timeless = timeless_equations(model, times)
-            solve_static_equations(timeless, times)
-            simulation = Simulation(model, times, inputs, options, timer, deadline)
-        with phase(timer, 'march'):
+        return WithoutGrid(model, wrt, grid, timer).simulate(run.march, run.whole) if grid else run.whole()
+
+
+def _check_grid(wrt, grid):
+    """Refuse a model without elements and without ``nfe``, and options for elements that are there already."""
+    if grid and discretised(wrt):
+        raise FesdError(wrt, f"simulate: it has elements already, so {', '.join(grid)} does not apply", "leave it out")
+    if 'nfe' not in grid and wrt not in moving_grids(wrt):
+        fix = "apply fesd.finite_elements first" + ("" if discretised(wrt) else ", or say how many elements to simulate with (nfe)")
+        raise FesdError(wrt, "simulate: its elements are not movable", fix)
+
+
+class _Run:
+    """One simulation of a model that has elements; parameters as of ``simulate``, with a Deadline."""
+
+    def __init__(self, model, wrt, inputs, options, timer, deadline):
+        self._model, self._wrt, self._inputs = model, wrt, inputs
+        self._options, self._timer, self._deadline = options, timer, deadline
+
+    def whole(self) -> pd.DataFrame:
+        """Simulate on the whole grid; returns the trajectory."""
+        times, timeless = self._read_timeless()
+        with phase(self._timer, 'read'):
+            simulation = Simulation(self._model, times, self._inputs, self._options, self._timer, self._deadline)
+        with phase(self._timer, 'march'):
             simulation.run()
-        with phase(timer, 'review'):
-            evaluate_scalars(model, times, timeless)
-            set_indicators(model)
-            diagnose(model)
-        with phase(timer, 'trajectory'):
-            return trajectory(model, wrt)
+        with phase(self._timer, 'review'):
+            self._complete(times, timeless)
+            diagnose(self._model)
+        with phase(self._timer, 'trajectory'):
+            return trajectory(self._model, self._wrt)
+
+    def march(self, nfe: int) -> pd.DataFrame:
+        """Simulate with elements that march along, ``nfe`` and one for each switch; returns the trajectory."""
+        times, timeless = self._read_timeless()
+        with phase(self._timer, 'read'):
+            marching = MarchingElements(self._model, times, self._inputs, nfe, self._options, self._timer, self._deadline)
+        with phase(self._timer, 'march'):
+            marching.run()
+        with phase(self._timer, 'review'):
+            self._complete(times, timeless)
+        with phase(self._timer, 'trajectory'):
+            return marching.trajectory
+
+    def _read_timeless(self):
+        """Solve equations without time that are there before the simulation, and return all of them with the TimeIndex."""
+        with phase(self._timer, 'read'):
+            times = TimeIndex(self._wrt)
+            timeless = timeless_equations(self._model, times)
+            solve_static_equations(timeless, times)
+        return times, timeless
+
+    def _complete(self, times, timeless):
+        """Set what follows from the values over time."""
+        evaluate_scalars(self._model, times, timeless)
+        set_indicators(self._model)
 
 
 def states_fixed_later(model: Block, wrt: ContinuousSet) -> Iterator[VarData]:

@@ -1,0 +1,119 @@
+"""Simulate a model that has no elements: they are laid, simulated, and taken away again.
+
+Where all elements have the same equations, a few of them are laid and march (``marching_elements``).  All of them are where inputs
+change (control stages, signals), where something happens at their boundaries (hysteresis, state jumps, contacts), and where
+equations or results contain the time itself, data over time or an ``Integral``.
+
+Takes: a model before ``fesd.finite_elements``; ``fesd.dcs`` is applied while it is simulated.
+Leaves: the trajectory; values at the times that the ContinuousSet has.  All else on the model is as before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pyomo.common.dependencies import pandas as pd
+from pyomo.core import Block, TransformationFactory, Var, value
+from pyomo.dae import ContinuousSet, DerivativeVar, Integral
+from pyomo.gdp import Disjunct
+
+from pyomo_fesd.core import all_switched_systems, own_data, phase, restored, signals
+from pyomo_fesd.finite_elements import FiniteElements
+from pyomo_fesd.results import SWITCHES, switches
+from pyomo_fesd.simulation.marching_elements import PLACES, ElementsDiffer
+
+#: Elements march where there are at least so many times as many as their places.
+WORTH_IT = 2
+#: Options of ``fesd.finite_elements`` that ``simulate`` takes for a model without elements.
+OPTIONS = 'nfe', 'ncp', 'scheme', 'cross_complementarity', 'piecewise_constant', 'continuous', 'fixed_points'
+
+
+class WithoutGrid:
+    """Lays elements for one simulation.
+
+    Parameters
+    ----------
+    model : Block
+    wrt : ContinuousSet
+    grid : dict
+        those of ``OPTIONS`` that are given
+    timer : HierarchicalTimer
+    """
+
+    def __init__(self, model: Block, wrt: ContinuousSet, grid: dict, timer):
+        self._model, self._wrt, self._timer = model, wrt, timer
+        self._config = FiniteElements.CONFIG(grid)
+
+    def simulate(self, march: Callable[[int], pd.DataFrame], whole: Callable[[], pd.DataFrame]) -> pd.DataFrame:
+        """Simulate with ``march`` (of a number of elements) where that applies, else on the ``whole`` grid.
+
+        Both return the trajectory, and leave values on the elements.
+        """
+        known = _Values(self._model.model())
+        found = self._marched(known, march)
+        if found is None:
+            with restored(self._model, self._wrt):
+                self._lay()
+                found = whole()
+                found.attrs[SWITCHES] = switches(self._model, self._wrt)
+                known.read()
+        known.write()
+        return found
+
+    def _marched(self, known, march):
+        """The trajectory of elements that march; None where they cannot."""
+        if not self._may_march():
+            return None
+        try:
+            with restored(self._model, self._wrt):
+                self._lay_few()
+                found = march(self._config.nfe)
+                known.read()
+                return found
+        except ElementsDiffer:
+            return None
+
+    def _may_march(self):
+        """Whether nothing is known that makes elements differ; events at boundaries are known after ``fesd.dcs``."""
+        nfe, root = self._config.nfe, self._model.model()
+        if isinstance(nfe, list) or nfe < WORTH_IT * PLACES or self._config.fixed_points:
+            return False
+        integrals = root.component_objects(Integral, descend_into=(Block, Disjunct))
+        systems = all_switched_systems(root)
+        at_boundaries = systems.hysteresis or systems.resets or systems.contacts
+        return len(self._wrt) == 2 and not signals(self._wrt) and not at_boundaries and next(integrals, None) is None
+
+    def _lay_few(self):
+        """Lay ``PLACES`` elements, and one for the rest of the horizon."""
+        first, last, nfe = self._wrt.first(), self._wrt.last(), self._config.nfe
+        here = first + PLACES * (last - first) / nfe
+        self._lay(nfe=[PLACES, 1], fixed_points=[here], equilibration='none')
+
+    def _lay(self, **changes):
+        with phase(self._timer, 'transform'):
+            TransformationFactory('fesd.dcs').apply_to(self._model, wrt=self._wrt)
+            given = {name: self._config[name] for name in OPTIONS} | changes
+            TransformationFactory('fesd.finite_elements').apply_to(self._model, wrt=self._wrt, **given)
+
+
+class _Values:
+    """Values of the variables and indicators that a model has before elements are laid."""
+
+    def __init__(self, root):
+        places = Block, Disjunct
+        self._variables = [v for ctype in (Var, DerivativeVar) for v in own_data(root, ctype, places) if not v.fixed]
+        self._root, self._numbers, self._weights = root, [], []
+
+    def read(self):
+        """Read what the simulation has found."""
+        self._numbers = [(v, v.value) for v in self._variables]
+        multipliers = all_switched_systems(self._root).multipliers
+        self._weights = [(disjunct, value(weight, exception=False)) for disjunct, weight in multipliers.items()]
+
+    def write(self):
+        """Write it to the model as it was before."""
+        for v, number in self._numbers:
+            v.set_value(number, skip_validation=True)
+        for disjunct, weight in self._weights:
+            # Pyomo's own link: near 0 or 1 it sets the Boolean, between it leaves it unset
+            disjunct.binary_indicator_var.set_value(weight, skip_validation=True)
