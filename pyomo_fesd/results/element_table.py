@@ -25,42 +25,43 @@ class ElementTable:
     """
 
     def __init__(self, model: Block, times: TimeIndex):
-        self._model, self._times, self._grid = model, times, moving_grids(model)[times.wrt].grid
+        self._model, self._times, self._tau = model, times, moving_grids(model)[times.wrt].grid.tau
         self._columns = list(columns_over_time(model, times.wrt))
-        # these alone are numbers already
-        self._positions = {c.title for c in self._positions_in(())}
-        self._rows, self._number, self._expressions = [], 0, {}
-
-    def _positions_in(self, elements):
-        found = complementarity_positions(self._model, self._times.wrt, self._times, elements)
-        return [Column(name, mode, shares) for name, modes in found.items() for mode, shares in modes.items()]
+        self._has_positions = bool(self._positions(()))
+        self._rows, self._number, self._at = [], 0, {}
 
     def begin(self, label: float) -> None:
         """Write the row of the first time."""
-        self._write((label,), (float(label),), 1)
+        self._write((label,), (float(label),), 1, self._positions(()))
 
-    def add(self, element: Element, left: float, length: float) -> None:
-        """Write the rows of an ``element`` that begins at the time ``left``, with its present values."""
-        self._number += 1
-        labels = element.own_labels
-        times = [left + c * length for c in self._grid.tau]
-        self._write(labels, (*times, left + length)[: len(labels)], self._number, (element,))
+    def add(self, solved: list[tuple[Element, float, float]]) -> None:
+        """Write the rows of ``solved`` elements, each with the time of its left boundary and its length."""
+        positions = self._positions(tuple(element for element, *_ in solved)) if self._has_positions else {}
+        for element, left, length in solved:
+            self._number += 1
+            times = [*(left + c * length for c in self._tau), left + length]
+            self._write(element.own_labels, times[: len(element.own_labels)], self._number, positions)
 
-    def _write(self, labels, times, number, elements=()):
-        positions = {c.title: c.values for c in self._positions_in(elements)} if self._positions else {}
+    def _positions(self, elements):
+        """The columns that are numbers already when they are read, by title."""
+        found = complementarity_positions(self._model, self._times.wrt, self._times, elements)
+        return {Column(name, mode, {}).title: shares for name, modes in found.items() for mode, shares in modes.items()}
+
+    def _write(self, labels, times, number, positions):
         for label, time in zip(labels, times):
-            found = [value_or_nan(expr) for expr in self._at(label)]
-            for k, title in enumerate(c.title for c in self._columns if self._positions):
-                found[k] = positions[title].get(label, found[k]) if title in positions else found[k]
+            found = [value_or_nan(expr) for expr in self._contents(label)]
+            for k, column in enumerate(self._columns) if positions else ():
+                if column.title in positions:
+                    found[k] = value_or_nan(positions[column.title].get(label))
             self._rows.append((time, time, number, *found))
 
-    def _at(self, label):
+    def _contents(self, label):
         """What the columns contain at a label."""
-        if label not in self._expressions:
-            self._expressions[label] = [None if c.title in self._positions else c.values.get(label) for c in self._columns]
-        return self._expressions[label]
+        if label not in self._at:
+            self._at[label] = [column.values.get(label) for column in self._columns]
+        return self._at[label]
 
     def frame(self) -> pd.DataFrame:
         """Return the trajectory, index ``time``."""
-        names = ['time', 'label', 'element', *(c.title for c in self._columns)]
+        names = ['time', 'label', 'element', *(column.title for column in self._columns)]
         return pd.DataFrame(self._rows, columns=names).set_index('time')

@@ -76,17 +76,12 @@ def labelled_switches(model: Block, wrt: ContinuousSet) -> list[tuple[float, Swi
     """Return ``(label, Switch)`` in order of time; the label is that of the element boundary at which it happens."""
     found, index = elements(wrt), TimeIndex(wrt)
     times = physical_time(model, wrt)
-    systems = _systems(model, wrt, index).items()
+    systems = (_systems(model, index) | complementarity_modes(model, wrt, index)).items()
     changes = [(t, Switch(times[t], name, *both)) for name, modes in systems for t, *both in _changes(modes, found)]
     for _, label, name, after in jumps_that_happen(model, wrt):
         before = [(x, value(x)) for x, _ in after]
         changes.append((label, Switch(times[label], name, _state_values(before, index), _state_values(after, index))))
     return sorted(changes, key=lambda change: change[1].time)
-
-
-def _systems(model, wrt, index):
-    """All that switches: ``{name: {mode: {label: expression that is positive there}}}``."""
-    return disjunction_modes(model, index) | complementarity_modes(model, wrt, index) | surface_sides(model, index)
 
 
 class ElementSwitches:
@@ -103,16 +98,29 @@ class ElementSwitches:
     """
 
     def __init__(self, model: Block, index: TimeIndex):
-        self.found, self._systems, self._modes = Switches(), _systems(model, index.wrt, index), {}
+        self._model, self._index, self._modes, self.found = model, index, {}, Switches()
+        self._systems = _systems(model, index)
+        self._has_own = bool(complementarity_modes(model, index.wrt, index))
 
-    def add(self, element: Element, left: float) -> None:
-        """Add those at the time ``left`` at which an ``element`` begins."""
-        for name, modes in self._systems.items():
-            active, before = _active_mode(modes, element), self._modes.get(name)
-            if active is not None:
-                self._modes[name] = active
-                if before not in (None, active):
-                    self.found.append(Switch(left, name, before, active))
+    def add(self, solved: list[tuple[Element, float, float]]) -> None:
+        """Add the switches at the left boundaries of ``solved`` elements, each with the time of its left boundary and its length."""
+        # some of their expressions are numbers
+        own = complementarity_modes(self._model, self._index.wrt, self._index) if self._has_own else {}
+        for element, left, _ in solved:
+            for name, modes in (self._systems | own).items():
+                self._add(name, _active_mode(modes, element), left)
+
+    def _add(self, name, active, time):
+        before = self._modes.get(name)
+        if active is not None:
+            self._modes[name] = active
+            if before not in (None, active):
+                self.found.append(Switch(time, name, before, active))
+
+
+def _systems(model, index):
+    """What switches besides hand-written complementarities: ``{name: {mode: {label: expression that is positive there}}}``."""
+    return disjunction_modes(model, index) | surface_sides(model, index)
 
 
 def _changes(modes, found: tuple[Element, ...]) -> Iterator[tuple]:

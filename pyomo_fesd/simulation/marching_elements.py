@@ -130,9 +130,8 @@ class MarchingElements:
         is_first = solved[0][1] == self._first
         new = solved if is_first else solved[1:]
         with phase(self._timer, 'trajectory'):
-            for place, left, length in new:
-                self._table.add(place, left, length)
-                self._switches.add(place, left)
+            self._table.add(new)
+            self._switches.add(new)
         grid = self._moving.grid
         self._moving.grid = replace(grid, elements=tuple(place for place, *_ in solved))
         self._moving.begin = None if is_first else solved[0][1]

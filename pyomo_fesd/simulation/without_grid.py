@@ -80,7 +80,7 @@ class WithoutGrid:
             return False
         integrals = root.component_objects(Integral, descend_into=(Block, Disjunct))
         systems = all_switched_systems(root)
-        at_boundaries = systems.hysteresis or systems.resets or systems.contacts
+        at_boundaries = systems.resets or systems.contacts
         return len(self._wrt) == 2 and not signals(self._wrt) and not at_boundaries and next(integrals, None) is None
 
     def _lay_few(self):
