@@ -112,6 +112,11 @@ class MovingGrid(AutoSlots.Mixin):
         self.complementarities, self.instants = [], {}
         self.sources, self.splits, self.split_sources = ComponentMap(), ComponentMap(), ComponentMap()
 
+    @property
+    def new_elements(self) -> tuple[Element, ...]:
+        """The elements, without the first one where they march along: it is the last of the round before."""
+        return self.grid.elements if self.begin is None else self.grid.elements[1:]
+
     def source(self, condition):
         """Return the user's condition that a generated one belongs to; any other is its own source."""
         return self.split_sources.get(condition, condition)

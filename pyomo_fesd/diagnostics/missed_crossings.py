@@ -40,7 +40,7 @@ def missed_crossings(model: Block, wrt: ContinuousSet, functions: list[Switching
     moving = moving_grids(model)[wrt]
     time, after = moving.physical_time(), _values_after_jumps(model, wrt)
     for f in _kept(moving, functions):
-        found = next(filter(None, (_crossing(f, element, moving.grid, after) for element in moving.grid.elements)), None)
+        found = next(filter(None, (_crossing(f, element, moving.grid, after) for element in moving.new_elements)), None)
         if found is not None:
             element, crossing = found
             when = time[element.left] + crossing * (time[element.right] - time[element.left])

@@ -106,8 +106,7 @@ def _meetings(s, zero, moving):
     for element in moving.grid.elements:
         label = element.points[0]
         slides = label in s.c and SLIDING < s.nu[label].value < 1 - SLIDING and abs(value(s.c[label])) <= zero
-        # of elements that march along the first has been looked at before
-        if slides and not before and (moving.begin is None or element.n > 1):
+        if slides and not before and element in moving.new_elements:
             yield label
         before = slides
 

@@ -100,20 +100,27 @@ class MarchingElements:
             found, left = self._solver.solve(place, aim, warm), self._last - rest
             solved.append((place, left, found.length))
             rest -= found.length
-            warm = not self._is_cut(found, aim)
             self._progress.time = self._last - rest
+            warm = self._goes_on(found, aim)
         self._take_down(solved)
         return place
 
-    def _is_cut(self, found, aim):
-        """Whether an event has cut the element short; it is noted."""
+    def _goes_on(self, found, aim):
+        """Whether the active set after an element is known; events are noted.
+
+        Raises
+        ------
+        FesdError
+            where switches accumulate
+        """
         is_cut = found.length < aim - CUT * max(aim, self._h)
-        if is_cut:
+        if is_cut or found.events:
             events = self._progress.events[self._places[0].stage]
-            events.append((self._progress.time + found.length, 'switch'))
+            events.append((self._progress.time, ', '.join(found.events) or 'switch'))
             if found.length < SHORT * self._h and accumulation(events) is not None:
                 raise self._progress.error("too many switches", "end before")
-        return is_cut
+        # after an event another active set holds
+        return bool(found.events) or not is_cut
 
     def _next_round(self, solved):
         """Take down the solved elements and hand on the values of the last; returns what is solved then, and what is not."""

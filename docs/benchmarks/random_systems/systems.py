@@ -157,10 +157,16 @@ def _region(part, k, c, X):
     return lower + ([c <= part.levels[k] * X] if k < len(part.levels) else [])
 
 
-def transform(m, system, **options):
-    """Apply ``fesd.dcs`` and ``fesd.finite_elements``."""
+def to_complementarity(m, system):
+    """Apply ``fesd.dcs``."""
     held = [m.component(f'part{j}') for j, part in enumerate(system.parts) if part.hysteresis]
     pyo.TransformationFactory('fesd.dcs').apply_to(m, **({'hysteresis': held} if held else {}))
+    return m
+
+
+def transform(m, system, **options):
+    """Apply ``fesd.dcs`` and ``fesd.finite_elements``."""
+    to_complementarity(m, system)
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, wrt=m.t, nfe=system.nfe, ncp=3, **options)
     return m
 
