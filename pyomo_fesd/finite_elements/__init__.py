@@ -17,6 +17,7 @@ The transformation reads the switched systems that other transformations recorde
 """
 
 from pyomo_fesd.finite_elements.equilibration import TINY
+from pyomo_fesd.finite_elements.explicit_time import differ
 from pyomo_fesd.finite_elements.first_mode import refuse_first_mode, refuse_first_modes
 from pyomo_fesd.finite_elements.hysteresis import LEFT, RIGHT
 from pyomo_fesd.finite_elements.lengths import LEAST

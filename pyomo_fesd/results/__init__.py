@@ -1,8 +1,9 @@
 """Results on physical time: trajectories, switches, plots and switching functions of a transformed model.
 
 Read ``physical_time`` first (labels and elements), then ``disjunction_modes`` and ``complementarity_modes`` (which mode is active),
-then what users call: ``trajectory``, ``switches`` and ``plot``.  ``switching_functions`` reads c, p, n and nu for diagnostics and
-refinement; ``indicators`` sets the Booleans of disjuncts after a solve.
+then what users call: ``trajectory``, ``switches`` and ``plot``.  ``element_table`` writes a trajectory while elements march along.
+``switching_functions`` reads c, p, n and nu for diagnostics and refinement; ``indicators`` sets the Booleans of disjuncts after a
+solve.
 """
 
 from pyomo_fesd.results.element_table import ElementTable

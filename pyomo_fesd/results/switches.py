@@ -103,7 +103,7 @@ class ElementSwitches:
         self._has_own = bool(complementarity_modes(model, index.wrt, index))
 
     def add(self, solved: list[tuple[Element, float, float]]) -> None:
-        """Add the switches at the left boundaries of ``solved`` elements, each with the time of its left boundary and its length."""
+        """Add the switches at the left boundaries of ``solved`` elements, each given with the time there and its length."""
         # some of their expressions are numbers
         own = complementarity_modes(self._model, self._index.wrt, self._index) if self._has_own else {}
         for element, left, _ in solved:

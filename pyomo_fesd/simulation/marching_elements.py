@@ -16,14 +16,16 @@ Does not apply: where the equations of the elements differ (``ElementsDiffer``),
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from math import ceil
 
 from pyomo.common.dependencies import pandas as pd
-from pyomo.core import Block, Var
+from pyomo.core import Block, Expression, Var
 from pyomo.gdp import Disjunct
 
 from pyomo_fesd.core import FesdError, TimeIndex, moving_grids, own_data, phase
 from pyomo_fesd.diagnostics import MarchReview
+from pyomo_fesd.finite_elements import differ
 from pyomo_fesd.results import SWITCHES, ElementSwitches, ElementTable
 from pyomo_fesd.simulation.element_solver import CUT, NO_STEP, ElementSolver
 from pyomo_fesd.simulation.progress import Progress, accumulation
@@ -49,7 +51,7 @@ class MarchingElements:
         self._h = (self._last - self._first) / nfe
         self._progress = Progress(times.wrt, self._moving.grid.stages, deadline)
         self._solver = ElementSolver(model, times, inputs, options, timer, self._progress)
-        if not self._solver.are_alike(self._places[1:]):
+        if not self._solver.are_alike(self._places[1:]) or _expressions_differ(model, times, self._places[1:]):
             raise ElementsDiffer
         self._over_time = list(times.families(own_data(model.model(), Var, (Block, Disjunct))).values())
         self._moves = self._pairs(self._places[0], self._places[-1])
@@ -152,3 +154,10 @@ class MarchingElements:
         frame = self._table.frame()
         frame.attrs[SWITCHES] = self._switches.found
         return frame
+
+
+def _expressions_differ(model, times, places):
+    """Whether a named expression, which no equation need contain, has other numbers in other elements."""
+    named = times.families(own_data(model, Expression, Block)).values()
+    at_points = ([partial(some.__getitem__, place.points[0]) for place in places if place.points[0] in some] for some in named)
+    return any(len(expressions) > 1 and differ(expressions) for expressions in at_points)

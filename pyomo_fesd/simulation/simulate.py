@@ -1,16 +1,16 @@
-"""``simulate``: solve a system with zero degrees of freedom on its moving grid, or find a start for all elements at once.
+"""``simulate``: solve a system with zero degrees of freedom element by element, or find a start for all elements at once.
 
-Element after element is solved by itself, so no homotopy over the whole horizon is needed.
+Each element is solved by itself, so no homotopy over the whole horizon is needed.
 
-Takes: a model on a moving grid whose states at the first time are fixed.
-Leaves: values of all variables over time: the solution of a system with zero degrees of freedom (lengths are not equalised), or
-a start for ``mpec_hybrid`` with ``warm_start=True``.
+Takes: a model whose states at the first time are fixed, on a moving grid or without elements.
+Leaves: on a grid values of all variables over time, the solution of a system with zero degrees of freedom or a start for
+``mpec_hybrid`` with ``warm_start=True``; without elements values at the times that the ContinuousSet has.
 Does not apply: to systems with degrees of freedom; inputs have to be given.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from pyomo.common.dependencies import pandas as pd
 from pyomo.common.gc_manager import PauseGC
@@ -53,12 +53,16 @@ def simulate(
     timer: HierarchicalTimer | None = None,
     **options,
 ) -> pd.DataFrame:
-    """Simulate a system with zero degrees of freedom on its moving grid, element by element.
+    """Simulate a system with zero degrees of freedom, element by element.
+
+    A model after ``fesd.finite_elements`` is simulated on its grid and keeps the values there.  Any other one is simulated with
+    ``nfe`` elements and one more for each switch, as written or after ``fesd.dcs`` (which it needs for ``hysteresis``).  These
+    elements are no part of the model afterwards, nor are they all laid at once where they have the same equations.
 
     Parameters
     ----------
     model : Block
-        after ``fesd.finite_elements``; its states are fixed at the first time
+        its states are fixed at the first time
     wrt : ContinuousSet, optional
     inputs : Var or list of Var
         variables over time that keep their present values, such as a guess of controls; those named in
@@ -67,17 +71,26 @@ def simulate(
         for the time of each phase; in the phase ``march``, ``newton`` counts elements tried by Newton's method and ``mpcc`` the
         small problems with complementarity
     options : options of ``mpec_hybrid`` for the small problems with complementarity, solved where modes change; ``time_limit`` is
-        that of the whole simulation
+        that of the whole simulation.  Without a grid also ``nfe``, ``ncp``, ``scheme``, ``cross_complementarity``,
+        ``piecewise_constant``, ``continuous`` and ``fixed_points``, as of ``fesd.finite_elements``
 
     Returns
     -------
-    pandas.DataFrame, the ``trajectory``; the model has the values
+    pandas.DataFrame
+        the ``trajectory``; ``switches`` takes it as well as a model with a grid.  The model has the values on the grid; without
+        one it has those at the times of its ContinuousSet.
 
     Raises
     ------
     FesdError
-        where the simulation cannot go on: the time limit, more switches than elements (with the time at which they accumulate, if
-        they do), a state that is not fixed at the first time, an undetermined variable.  The model has the values up to there.
+        where the simulation cannot go on: the time limit, more switches than elements of a grid, switches that accumulate (with
+        their limit), a state that is not fixed at the first time, an undetermined variable.  A model with a grid has the values
+        up to there; any other one is as before, and elements that march leave their trajectory as ``trajectory`` of the error.
+
+    Examples
+    --------
+    >>> frame = pyomo_fesd.simulate(m, nfe=100, ncp=3)
+    >>> pyomo_fesd.switches(frame)
     """
     wrt = find_continuous_set(model, wrt, 'simulate')
     grid = {name: options.pop(name) for name in OPTIONS if name in options}
@@ -122,17 +135,26 @@ class _Run:
         with phase(self._timer, 'trajectory'):
             return trajectory(self._model, self._wrt)
 
-    def march(self, nfe: int) -> pd.DataFrame:
-        """Simulate with elements that march along, ``nfe`` and one for each switch; returns the trajectory."""
+    def march(self, nfe: int) -> Callable[[], pd.DataFrame]:
+        """Prepare elements that march along, ``nfe`` and one for each switch; returns the function that simulates.
+
+        Raises
+        ------
+        ElementsDiffer
+        """
         times, timeless = self._read_timeless()
         with phase(self._timer, 'read'):
             marching = MarchingElements(self._model, times, self._inputs, nfe, self._options, self._timer, self._deadline)
-        with phase(self._timer, 'march'):
-            marching.run()
-        with phase(self._timer, 'review'):
-            self._complete(times, timeless)
-        with phase(self._timer, 'trajectory'):
-            return marching.trajectory
+
+        def run():
+            with phase(self._timer, 'march'):
+                marching.run()
+            with phase(self._timer, 'review'):
+                self._complete(times, timeless)
+            with phase(self._timer, 'trajectory'):
+                return marching.trajectory
+
+        return run
 
     def _read_timeless(self):
         """Solve equations without time that are there before the simulation, and return all of them with the TimeIndex."""

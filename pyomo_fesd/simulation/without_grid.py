@@ -10,6 +10,7 @@ Leaves: the trajectory; values at the times that the ContinuousSet has.  All els
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
 from pyomo.common.dependencies import pandas as pd
@@ -17,10 +18,12 @@ from pyomo.core import Block, TransformationFactory, Var, value
 from pyomo.dae import ContinuousSet, DerivativeVar, Integral
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import all_switched_systems, own_data, phase, restored, signals
+from pyomo_fesd.core import all_switched_systems, own_data, phase, restored, signals, withheld_messages
 from pyomo_fesd.finite_elements import FiniteElements
 from pyomo_fesd.results import SWITCHES, switches
 from pyomo_fesd.simulation.marching_elements import PLACES, ElementsDiffer
+
+logger = logging.getLogger('pyomo_fesd')
 
 #: Elements march where there are at least so many times as many as their places.
 WORTH_IT = 2
@@ -44,13 +47,18 @@ class WithoutGrid:
         self._model, self._wrt, self._timer = model, wrt, timer
         self._config = FiniteElements.CONFIG(grid)
 
-    def simulate(self, march: Callable[[int], pd.DataFrame], whole: Callable[[], pd.DataFrame]) -> pd.DataFrame:
-        """Simulate with ``march`` (of a number of elements) where that applies, else on the ``whole`` grid.
+    def simulate(self, march: Callable[[int], Callable], whole: Callable[[], pd.DataFrame]) -> pd.DataFrame:
+        """Simulate with elements that march where these are alike, else on the ``whole`` grid.
 
-        Both return the trajectory, and leave values on the elements.
+        Parameters
+        ----------
+        march : callable
+            prepares a number of elements, or raises ElementsDiffer; returns a function as the next one
+        whole : callable
+            returns the trajectory and leaves values on the elements
         """
         known = _Values(self._model.model())
-        found = self._marched(known, march)
+        found = self._marched(known, march) if self._may_march() else None
         if found is None:
             with restored(self._model, self._wrt):
                 self._lay()
@@ -61,17 +69,20 @@ class WithoutGrid:
         return found
 
     def _marched(self, known, march):
-        """The trajectory of elements that march; None where they cannot."""
-        if not self._may_march():
-            return None
-        try:
-            with restored(self._model, self._wrt):
+        """The trajectory of elements that march; None if they differ."""
+        with restored(self._model, self._wrt):
+            # the whole grid says the same again
+            with withheld_messages(logger.name) as messages:
                 self._lay_few()
-                found = march(self._config.nfe)
-                known.read()
-                return found
-        except ElementsDiffer:
-            return None
+            try:
+                run = march(self._config.nfe)
+            except ElementsDiffer:
+                return None
+            for message in messages:
+                logger.handle(message)
+            found = run()
+            known.read()
+            return found
 
     def _may_march(self):
         """Whether nothing is known that makes elements differ; events at boundaries are known after ``fesd.dcs``."""
