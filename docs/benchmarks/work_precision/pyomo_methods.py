@@ -31,17 +31,17 @@ def mpec_hybrid(problem, K, N, scheme, limit, **_):
 
 
 def simulate(problem, K, N, scheme, limit, **_):
-    """``simulate`` on moving elements."""
+    """``simulate``, without elements on the model."""
     started = time.perf_counter()
-    m = problem.moving(K, N, scheme)
+    m = problem.transformed()
     built = time.perf_counter()
     try:
-        pyomo_fesd.simulate(m)
+        frame = pyomo_fesd.simulate(m, nfe=N, ncp=K, scheme=SCHEMES[scheme], time_limit=limit)
     except pyomo_fesd.FesdError as error:
         return Found(str(error)[:100], False, built - started, time.perf_counter() - built)
     found = Found('simulated', True, built - started, time.perf_counter() - built)
     problem.read(found, m)
-    return _with_switch(found, m)
+    return _with_switch(found, frame)
 
 
 def refine(problem, K, scheme, width, limit, **_):
@@ -130,9 +130,10 @@ def _solved(problem, m, started, limit):
     return found
 
 
-def _with_switch(found, m):
+def _with_switch(found, solved):
+    """Add the time of the first switch of a model, or of a trajectory."""
     if found.state is not None:
-        found.switch = next((s.time for s in pyomo_fesd.switches(m)), None)
+        found.switch = next((s.time for s in pyomo_fesd.switches(solved)), None)
     return found
 
 
