@@ -37,7 +37,13 @@ LEAST, BEYOND, LONGER = (1e-2, 1e-4), {'lpec': 'full', 'relaxation': 'elastic'},
 
 
 class ElementSolver:
-    """Solves the elements of one moving grid in their order; errors say the ``progress``."""
+    """Solves the elements of one moving grid in their order; errors say the ``progress``.
+
+    Attributes
+    ----------
+    given : ComponentSet
+        variables with known values
+    """
 
     def __init__(self, model, times: TimeIndex, inputs, options, timer, progress: Progress):
         self._model, self._first, self._options, self._timer = model, times.wrt.first(), options, timer
@@ -49,9 +55,9 @@ class ElementSolver:
         # gaps and forces of contacts are 0 to round-off over long times, which is no size
         self._sizes = Sizes(self._times) if has_contacts else None
         self._impacts = ImpactEvents(self._moving.state_jumps, self._times, self._solve_impact)
-        given = given_variables(model, self._times, inputs, self._moving.held)
-        given.update(v for some in self._hysteresis for e in self._grid.elements for v in some.variables(e.right))
-        self._reader = EquationReader(model, self._moving, self._times, given)
+        self.given = given_variables(model, self._times, inputs, self._moving.held)
+        self.given.update(v for some in self._hysteresis for e in self._grid.elements for v in some.variables(e.right))
+        self._reader = EquationReader(model, self._moving, self._times, self.given)
         self._equations, self._classes, self._end = {}, {}, ElementEnd()
 
     def are_alike(self, elements: Iterable[Element]) -> bool:

@@ -5,7 +5,7 @@ Leaves: equal values of a held control throughout its control stage.
 Does not apply: to states that are fixed at the first and the last time only, which a simulation leaves alone.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 
 from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Constraint, Var
@@ -45,6 +45,15 @@ def prescribed_states(model: Block, times: TimeIndex) -> Iterator[dict[float, Va
         for over_time in times.families(derivative.get_state_var().values()).values():
             if len(over_time) > 2 and all(v.fixed for v in over_time.values()):
                 yield over_time
+
+
+def hold_first_values(families: Iterable[dict[float, VarData]], first: float, given: Container[VarData]) -> None:
+    """Give the variables of each family over time the value of the first time, as a start; ``given`` and fixed ones keep theirs."""
+    for over_time in families:
+        number = over_time[first].value if first in over_time else None
+        for v in over_time.values() if number is not None else ():
+            if not v.fixed and v not in given:
+                v.set_value(number, skip_validation=True)
 
 
 def _hold_last_value(row, times):

@@ -28,6 +28,7 @@ from pyomo_fesd.diagnostics import MarchReview
 from pyomo_fesd.finite_elements import differ
 from pyomo_fesd.results import SWITCHES, ElementSwitches, ElementTable
 from pyomo_fesd.simulation.element_solver import CUT, NO_STEP, ElementSolver
+from pyomo_fesd.simulation.inputs import hold_first_values
 from pyomo_fesd.simulation.progress import Progress, accumulation
 
 #: E, the number of places.
@@ -73,6 +74,7 @@ class MarchingElements:
         """
         with phase(self._timer, 'begin'):
             self._solver.find_initial_values()
+        hold_first_values(self._over_time, self._first, self._solver.given)
         self._solver.begin_pass()
         self._solver.begin_stage()
         begin = [(some[self._first], some[self._first].value) for some in self._over_time if self._first in some]

@@ -66,7 +66,7 @@ def simulate(
     wrt : ContinuousSet, optional
     inputs : Var or list of Var
         variables over time that keep their present values, such as a guess of controls; those named in
-        ``piecewise_constant`` need not be named again
+        ``piecewise_constant`` need not be named again.  Without a grid the value at the end of each control stage counts
     timer : pyomo.common.timing.HierarchicalTimer, optional
         for the time of each phase; in the phase ``march``, ``newton`` counts elements tried by Newton's method and ``mpcc`` the
         small problems with complementarity
@@ -101,9 +101,10 @@ def simulate(
     deadline = Deadline.after(known(options).time_limit)
     options.pop('time_limit', None)
     timer = timer or HierarchicalTimer()
-    run = _Run(model, wrt, read_inputs(inputs, wrt), options, timer, deadline)
+    inputs = read_inputs(inputs, wrt)
+    run = _Run(model, wrt, inputs, options, timer, deadline)
     with PauseGC(), kept_values(states_fixed_later(model, wrt)), phase(timer, 'simulate'):
-        return WithoutGrid(model, wrt, grid, timer).simulate(run.march, run.whole) if grid else run.whole()
+        return WithoutGrid(model, wrt, inputs, grid, timer).simulate(run.march, run.whole) if grid else run.whole()
 
 
 def _check_grid(wrt, grid):

@@ -13,14 +13,16 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
+from pyomo.common.collections import ComponentSet
 from pyomo.common.dependencies import pandas as pd
 from pyomo.core import Block, TransformationFactory, Var, value
 from pyomo.dae import ContinuousSet, DerivativeVar, Integral
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import all_switched_systems, own_data, phase, restored, signals, withheld_messages
+from pyomo_fesd.core import TimeIndex, all_switched_systems, own_data, phase, restored, signals, withheld_messages
 from pyomo_fesd.finite_elements import FiniteElements
 from pyomo_fesd.results import SWITCHES, switches
+from pyomo_fesd.simulation.inputs import hold_first_values
 from pyomo_fesd.simulation.marching_elements import PLACES, ElementsDiffer
 
 logger = logging.getLogger('pyomo_fesd')
@@ -38,14 +40,18 @@ class WithoutGrid:
     ----------
     model : Block
     wrt : ContinuousSet
+    inputs : list of Var
+        the value at the end of each control stage holds throughout it
     grid : dict
         those of ``OPTIONS`` that are given
     timer : HierarchicalTimer
     """
 
-    def __init__(self, model: Block, wrt: ContinuousSet, grid: dict, timer):
+    def __init__(self, model: Block, wrt: ContinuousSet, inputs: list[Var], grid: dict, timer):
         self._model, self._wrt, self._timer = model, wrt, timer
         self._config = FiniteElements.CONFIG(grid)
+        # the times that elements add have no values of an input
+        self._held = list(ComponentSet([*self._config.piecewise_constant, *inputs]))
 
     def simulate(self, march: Callable[[int], Callable], whole: Callable[[], pd.DataFrame]) -> pd.DataFrame:
         """Simulate with elements that march where these are alike, else on the ``whole`` grid.
@@ -62,6 +68,7 @@ class WithoutGrid:
         if found is None:
             with restored(self._model, self._wrt):
                 self._lay()
+                self._start()
                 found = whole()
                 found.attrs[SWITCHES] = switches(self._model, self._wrt)
                 known.read()
@@ -100,10 +107,15 @@ class WithoutGrid:
         here = first + PLACES * (last - first) / nfe
         self._lay(nfe=[PLACES, 1], fixed_points=[here], equilibration='none')
 
+    def _start(self):
+        """Let variables at the times that the elements have added begin with the values of the first time."""
+        families = TimeIndex(self._wrt).families(own_data(self._model.model(), Var, (Block, Disjunct)))
+        hold_first_values(families.values(), self._wrt.first(), ComponentSet(v for u in self._held for v in u.values()))
+
     def _lay(self, **changes):
         with phase(self._timer, 'transform'):
             TransformationFactory('fesd.dcs').apply_to(self._model, wrt=self._wrt)
-            given = {name: self._config[name] for name in OPTIONS} | changes
+            given = {name: self._config[name] for name in OPTIONS} | {'piecewise_constant': self._held} | changes
             TransformationFactory('fesd.finite_elements').apply_to(self._model, wrt=self._wrt, **given)
 
 

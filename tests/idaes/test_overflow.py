@@ -60,3 +60,12 @@ def test_a_steady_flowsheet_has_no_continuous_set_and_is_told_so():
     m.fs = FlowsheetBlock(dynamic=False)
     with pytest.raises(pyomo_fesd.FesdError, match='dynamic=True'):
         pyo.TransformationFactory('fesd.finite_elements').apply_to(m.fs, wrt=m.fs.time, nfe=2, ncp=2)
+
+
+def test_without_elements_on_the_flowsheet():
+    m = example.build()
+    example.initialise(m)
+    frame = pyomo_fesd.simulate(m.fs, m.fs.time, nfe=15, ncp=3)
+    assert [s.time for s in pyomo_fesd.switches(frame)] == pytest.approx([example.OVERFLOW_TIME], rel=1e-9)
+    assert list(m.fs.time) == [0, example.END]
+    assert m.fs.cstr.volume[example.END].value == pytest.approx(example.CREST_VOLUME, rel=1e-9)

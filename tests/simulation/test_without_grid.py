@@ -260,6 +260,19 @@ def test_control_stages(laid):
     assert [m.x[t].value for t in m.t] == pytest.approx([0, 1, -2], abs=1e-9)
 
 
+@pytest.mark.parametrize('how', ['inputs', 'piecewise_constant'])
+def test_inputs_hold_on_the_whole_horizon(how, laid):
+    m = over_time(2, x=0.0)
+    m.u = pyo.Var(m.t, initialize=7.0)
+    m.u[...].set_value(1.5)
+    m.mode = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 1, m.dx[t] == m.u[t]], [m.x[t] >= 1, m.dx[t] == -m.u[t]]])
+    frame = pyomo_fesd.simulate(m, nfe=20, **{how: m.u})
+    assert laid == FEW
+    assert set(frame['u']) == {1.5}
+    assert [s.time for s in pyomo_fesd.switches(frame)] == pytest.approx([2 / 3], abs=1e-9)
+    assert [v.value for v in m.u.values()] == [1.5, 1.5]
+
+
 def test_state_jumps(laid):
     m = bouncing_ball.build(0.8, 1)
     frame = whole(m, laid, nfe=12, ncp=2)
