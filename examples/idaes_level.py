@@ -169,12 +169,13 @@ def boundaries(m):
 
 def changes(m):
     """Times at which the valve reaches or leaves a limit."""
-    table, start = (
-        pyomo_fesd.trajectory(m, m.fs.time),
-        pyomo_fesd.element_lengths(m, m.fs.time)['start'],
-    )
-    found, before = [], None
-    for element, flow in table.groupby('element')[FLOW]:
+    return changes_in(pyomo_fesd.trajectory(m, m.fs.time))
+
+
+def changes_in(table):
+    """The same in a trajectory."""
+    found, before, start = [], None, table.index[0]
+    for _, flow in table.groupby('element')[FLOW]:
         inner = flow.iloc[:-1]  # the last point may belong to the next piece
         now = (
             'open'
@@ -184,8 +185,8 @@ def changes(m):
             else 'follows'
         )
         if before not in (None, now):
-            found.append(Change(start[element], now))
-        before = now
+            found.append(Change(start, now))
+        before, start = now, flow.index[-1]
     return found
 
 

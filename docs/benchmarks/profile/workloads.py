@@ -57,19 +57,6 @@ def flowsheet(nfe, clock, timer):
     clock('solve')
 
 
-def flowsheet_without_grid(nfe, clock, timer):
-    """The same reactor: initialise at its own times, simulate without elements on the model."""
-    import idaes_level
-
-    clock.restart()
-    m = idaes_level.exact(idaes_level.build())
-    clock('build')
-    idaes_level.specify(m)
-    clock('initialise')
-    pyomo_fesd.simulate(m.fs, m.fs.time, nfe=nfe, ncp=3)
-    clock('march')
-
-
 def controller(clock, timer):
     """The steps of model predictive control of the tank after the first, solved again by ``set_instance``."""
     m = controlled_tank.discretise(controlled_tank.build())
@@ -105,7 +92,6 @@ def workloads(instances: Path | None) -> dict:
         f'cascade S = {TANKS}': (3, partial(_cold, partial(cascade.build, TANKS), ELEMENTS, 3)),
         'IDAES N = 60': (3, partial(flowsheet, 60)),
         'IDAES N = 400': (1, partial(flowsheet, 400)),
-        'IDAES N = 400, no grid': (3, partial(flowsheet_without_grid, 400)),
         f'MPC, {STEPS} steps': (5, controller),
     }
     return found | ({} if instances is None else {'MacMPEC, 5 medium': (3, partial(macmpec, instances))})
