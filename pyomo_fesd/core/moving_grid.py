@@ -77,7 +77,9 @@ class MovingGrid(AutoSlots.Mixin):
     instants : dict
         physical time -> ``Instant``
     begin : float or None
-        physical time at which the first element begins, where that is not the first label: elements that march along
+        physical time at which the first element begins, of elements that march along; else the first label
+    known : int
+        number of first elements that were there in the round before, of elements that march along; else 0
     """
 
     __slots__ = (
@@ -103,19 +105,20 @@ class MovingGrid(AutoSlots.Mixin):
         'hysteresis',
         'instants',
         'begin',
+        'known',
     )
 
     def __init__(self, wrt: ContinuousSet, block: Block, grid: Grid):
         for name in self.__slots__:
             setattr(self, name, None)
         self.wrt, self.block, self.grid = wrt, block, grid
-        self.complementarities, self.instants = [], {}
+        self.complementarities, self.instants, self.known = [], {}, 0
         self.sources, self.splits, self.split_sources = ComponentMap(), ComponentMap(), ComponentMap()
 
     @property
     def new_elements(self) -> tuple[Element, ...]:
-        """The elements, without the first one where they march along: it is the last of the round before."""
-        return self.grid.elements if self.begin is None else self.grid.elements[1:]
+        """The elements that are not known."""
+        return self.grid.elements[self.known :]
 
     def source(self, condition):
         """Return the user's condition that a generated one belongs to; any other is its own source."""
@@ -158,7 +161,7 @@ class MovingGrid(AutoSlots.Mixin):
 
     def physical_time(self) -> dict[float, float]:
         """Return the physical time of every label of the elements (eq. 9 and 10), in order of time."""
-        first = self.wrt.first()
+        first = self.grid.elements[0].left
         time = {first: float(first if self.begin is None else self.begin)}
         for element in self.grid.elements:
             left, h = time[element.left], value(self.duration(element))

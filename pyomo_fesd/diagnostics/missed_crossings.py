@@ -85,9 +85,10 @@ class _Kept:
 
     def leaves_smoothly(self, element, grid):
         """Whether a slide ends at the left boundary of ``element`` and its multiplier arrives there."""
-        if self.nu is None or element.n == 1:
+        first = grid.elements[0]
+        if self.nu is None or element is first:
             return False
-        before = grid.elements[element.n - 2]
+        before = grid.elements[element.n - first.n - 1]
         if self.sign(self, before) or any(t not in self.nu for t in (*before.points, element.points[0])):
             return False
         weights = interpolation_weights(grid.tau, np.ones(len(grid.tau)))

@@ -101,7 +101,7 @@ def _is_possible(rest, S, ways):
 def _meetings(s, zero, moving):
     """Labels where c = 0 and either mode is possible: the first time, and where a slide begins."""
     first, before = moving.wrt.first(), False
-    if moving.begin is None and first in s.c and abs(value(s.c[first])) <= zero:
+    if moving.begin in (None, first) and first in s.c and abs(value(s.c[first])) <= zero:
         yield first
     for element in moving.grid.elements:
         label = element.points[0]

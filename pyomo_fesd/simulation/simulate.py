@@ -136,8 +136,8 @@ class _Run:
         with phase(self._timer, 'trajectory'):
             return trajectory(self._model, self._wrt)
 
-    def march(self, nfe: int) -> Callable[[], pd.DataFrame]:
-        """Prepare elements that march along, ``nfe`` and one for each switch; returns the function that simulates.
+    def march(self, numbers: list[int]) -> Callable[[], pd.DataFrame]:
+        """Prepare elements that march along, these ``numbers`` and one for each switch; returns the function that simulates.
 
         Raises
         ------
@@ -145,7 +145,7 @@ class _Run:
         """
         times, timeless = self._read_timeless()
         with phase(self._timer, 'read'):
-            marching = MarchingElements(self._model, times, self._inputs, nfe, self._options, self._timer, self._deadline)
+            marching = MarchingElements(self._model, times, self._inputs, numbers, self._options, self._timer, self._deadline)
 
         def run():
             with phase(self._timer, 'march'):

@@ -1,8 +1,8 @@
 """Simulate a model that has no elements: they are laid, simulated, and taken away again.
 
-Where all elements have the same equations, a few of them are laid and march (``marching_elements``).  All of them are where inputs
-change (control stages, signals), where something happens at their boundaries (hysteresis, state jumps, contacts), and where
-equations or results contain the time itself, data over time or an ``Integral``.
+Where the elements between two boundaries that keep their time have the same equations, a few of them are laid and march
+(``marching_elements``).  All of them are where states jump at their boundaries (``state_jump``, contacts), and where equations or
+results contain the time itself, data over time or an ``Integral``.
 
 Takes: a model before ``fesd.finite_elements``; ``fesd.dcs`` is applied while it is simulated.
 Leaves: the trajectory; values at the times that the ContinuousSet has.  All else on the model is as before.
@@ -19,16 +19,27 @@ from pyomo.core import Block, TransformationFactory, Var, value
 from pyomo.dae import ContinuousSet, DerivativeVar, Integral
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import TimeIndex, all_switched_systems, own_data, phase, restored, signals, withheld_messages
+from pyomo_fesd.core import (
+    TimeIndex,
+    all_switched_systems,
+    own_data,
+    phase,
+    restored,
+    share_elements,
+    with_points,
+    withheld_messages,
+)
 from pyomo_fesd.finite_elements import FiniteElements
 from pyomo_fesd.results import SWITCHES, switches
 from pyomo_fesd.simulation.inputs import hold_first_values
-from pyomo_fesd.simulation.marching_elements import PLACES, ElementsDiffer
+from pyomo_fesd.simulation.marching_elements import ElementsDiffer
 
 logger = logging.getLogger('pyomo_fesd')
 
-#: Elements march where there are at least so many times as many as their places.
-WORTH_IT = 2
+#: Places of elements that march in each interval, and how many times as many elements there are where it is worth while.
+PLACES, WORTH_IT = 4, 2
+#: Largest part of an interval that its places take.
+PART = 0.5
 #: Options of ``fesd.finite_elements`` that ``simulate`` takes for a model without elements.
 OPTIONS = 'nfe', 'ncp', 'scheme', 'cross_complementarity', 'piecewise_constant', 'continuous', 'fixed_points'
 
@@ -52,14 +63,16 @@ class WithoutGrid:
         self._config = FiniteElements.CONFIG(grid)
         # the times that elements add have no values of an input
         self._held = list(ComponentSet([*self._config.piecewise_constant, *inputs]))
+        fixed = self._config.fixed_points
+        self._points, self._numbers = with_points(wrt, fixed), share_elements(wrt, self._config.nfe, fixed)
 
-    def simulate(self, march: Callable[[int], Callable], whole: Callable[[], pd.DataFrame]) -> pd.DataFrame:
+    def simulate(self, march: Callable[[list[int]], Callable], whole: Callable[[], pd.DataFrame]) -> pd.DataFrame:
         """Simulate with elements that march where these are alike, else on the ``whole`` grid.
 
         Parameters
         ----------
         march : callable
-            prepares a number of elements, or raises ElementsDiffer; returns a function as the next one
+            prepares numbers of elements, one for each interval, or raises ElementsDiffer; returns a function as the next one
         whole : callable
             returns the trajectory and leaves values on the elements
         """
@@ -82,7 +95,7 @@ class WithoutGrid:
             with withheld_messages(logger.name) as messages:
                 self._lay_few()
             try:
-                run = march(self._config.nfe)
+                run = march(self._numbers)
             except ElementsDiffer:
                 return None
             for message in messages:
@@ -92,20 +105,18 @@ class WithoutGrid:
             return found
 
     def _may_march(self):
-        """Whether nothing is known that makes elements differ; events at boundaries are known after ``fesd.dcs``."""
-        nfe, root = self._config.nfe, self._model.model()
-        if isinstance(nfe, list) or nfe < WORTH_IT * PLACES or self._config.fixed_points:
-            return False
+        """Whether it is worth while, and nothing is known that makes elements differ."""
+        root, worth = self._model.model(), sum(self._numbers) >= WORTH_IT * (PLACES + 1) * len(self._numbers)
         integrals = root.component_objects(Integral, descend_into=(Block, Disjunct))
         systems = all_switched_systems(root)
-        at_boundaries = systems.resets or systems.contacts
-        return len(self._wrt) == 2 and not signals(self._wrt) and not at_boundaries and next(integrals, None) is None
+        return worth and not (systems.resets or systems.contacts) and next(integrals, None) is None
 
     def _lay_few(self):
-        """Lay ``PLACES`` elements, and one for the rest of the horizon."""
-        first, last, nfe = self._wrt.first(), self._wrt.last(), self._config.nfe
-        here = first + PLACES * (last - first) / nfe
-        self._lay(nfe=[PLACES, 1], fixed_points=[here], equilibration='none')
+        """Lay ``PLACES`` elements in each interval, and one for the rest of it."""
+        ends = zip(self._points, self._points[1:], self._numbers)
+        here = [a + min(PLACES / number, PART) * (b - a) for a, b, number in ends]
+        inner = [*self._config.fixed_points, *here]
+        self._lay(nfe=[PLACES, 1] * len(here), fixed_points=inner, equilibration='none')
 
     def _start(self):
         """Let variables at the times that the elements have added begin with the values of the first time."""

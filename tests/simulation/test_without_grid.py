@@ -166,6 +166,54 @@ def test_long_runs_are_as_exact_as_short_ones(laid):
     assert frame['y'].to_numpy() == pytest.approx(0.5 + 0.5 * np.exp(-frame.index), abs=1e-7)
 
 
+# Intervals between boundaries that keep their time
+
+
+@pytest.mark.parametrize('nfe, few', [(40, [4, 1, 4, 1]), ([60, 3], [4, 1, 4, 1]), (8, 8)])
+def test_control_stages(nfe, few, laid):
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(initialize=[0, 1, 2])
+    m.x, m.u = pyo.Var(m.t, initialize=0), pyo.Var(m.t, initialize=lambda m, t: 1.0 if t <= 1 else -3.0)
+    m.dx = dae.DerivativeVar(m.x)
+    m.x[0].fix(0)
+    m.u.fix()
+    m.sgn = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 0.5, m.dx[t] == m.u[t]], [m.x[t] >= 0.5, m.dx[t] == 2 * m.u[t]]])
+    frame = pyomo_fesd.simulate(m, nfe=nfe, piecewise_constant=[m.u])
+    assert laid == [few]
+    assert [s.time for s in pyomo_fesd.switches(frame)] == pytest.approx([0.5, 1 + 1 / 6], abs=1e-9)
+    assert [m.x[t].value for t in m.t] == pytest.approx([0, 1.5, 0.5 - 2.5], abs=1e-9)
+    assert [m.u[t].value for t in m.t] == [1, 1, -3]
+    t = frame.index.to_numpy()
+    exact = np.select([t < 0.5, t < 1, t < 7 / 6], [t, 0.5 + 2 * (t - 0.5), 1.5 - 6 * (t - 1)], 0.5 - 3 * (t - 7 / 6))
+    assert frame['x'].to_numpy() == pytest.approx(exact, abs=1e-8)
+    assert t[-1] == pytest.approx(2, abs=1e-14) and np.all(np.diff(t) > 0)
+
+
+@pytest.mark.parametrize('kind', ['stepped', 'linear'])
+def test_signals(kind, laid):
+    def plant():
+        m = over_time(4, x=0.0)
+        m.u = pyomo_fesd.signal(m.t, [0, 1, 2, 4], [1.0, 2.0, -1.0, -1.0], kind=kind)
+        m.mode = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 1, m.dx[t] == m.u[t]], [m.x[t] >= 1, m.dx[t] == m.u[t] / 2]])
+        return m
+
+    m = plant()
+    frame = pyomo_fesd.simulate(m, nfe=60)
+    assert laid == [[4, 1] * 3]
+    exact = move(dcs(plant()), 60, 3)
+    table = pyomo_fesd.simulate(exact)
+    assert [s.time for s in pyomo_fesd.switches(frame)] == pytest.approx([s.time for s in pyomo_fesd.switches(exact)], abs=1e-9)
+    assert frame['x'].iloc[-1] == pytest.approx(table['x'].iloc[-1], abs=1e-9)
+
+
+def test_fixed_points(laid):
+    m = signum.build()
+    frame = pyomo_fesd.simulate(m, nfe=[40, 20], fixed_points=[0.5])
+    assert laid == [[4, 1, 4, 1]]
+    assert (frame.index <= 0.5).sum() == 121
+    assert [s.time for s in pyomo_fesd.switches(frame)] == pytest.approx([2 / 3], abs=1e-9)
+
+
 # What is left on the model
 
 
@@ -244,20 +292,6 @@ def whole(m, laid, **keywords):
     frame = pyomo_fesd.simulate(m, **keywords)
     assert laid[-1] == keywords['nfe']
     return frame
-
-
-def test_control_stages(laid):
-    m = pyo.ConcreteModel()
-    m.t = dae.ContinuousSet(initialize=[0, 1, 2])
-    m.x, m.u = pyo.Var(m.t, initialize=0), pyo.Var(m.t, initialize=lambda m, t: 1.0 if t <= 1 else -3.0)
-    m.dx = dae.DerivativeVar(m.x)
-    m.x[0].fix(0)
-    m.u.fix()
-    m.sgn = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 0.5, m.dx[t] == m.u[t]], [m.x[t] >= 0.5, m.dx[t] == m.u[t]]])
-    frame = whole(m, laid, nfe=20, piecewise_constant=[m.u])
-    assert laid == [20]
-    assert [s.time for s in pyomo_fesd.switches(frame)] == pytest.approx([0.5, 1 + 1 / 6], abs=1e-9)
-    assert [m.x[t].value for t in m.t] == pytest.approx([0, 1, -2], abs=1e-9)
 
 
 @pytest.mark.parametrize('how', ['inputs', 'piecewise_constant'])
