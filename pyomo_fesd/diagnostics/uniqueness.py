@@ -48,7 +48,7 @@ def not_unique(model: Block, wrt: ContinuousSet, functions: list[SwitchingFuncti
     """Yield messages for boundaries from which both modes lead away."""
     grid, time, rates = moving_grids(model)[wrt].grid, None, None
     # those of one Disjunction have the same name
-    zeros = {id(s): ZERO * largest_value(s.c) for s in functions}
+    zeros = {id(s): ZERO * largest_value(s.values) for s in functions}
     for s in functions:
         for label in _meetings(s, zeros[id(s)], grid, wrt):
             rates = rates or _Rates(model, wrt)
@@ -64,7 +64,7 @@ def not_unique(model: Block, wrt: ContinuousSet, functions: list[SwitchingFuncti
 def _others(s, functions, zeros, label):
     """The other switching functions that are zero at ``label``."""
     there = (o for o in functions if o is not s and label in o.c)
-    return [o for o in there if abs(value(o.c[label])) <= zeros[id(o)]]
+    return [o for o in there if abs(o.values[label]) <= zeros[id(o)]]
 
 
 def _leaves_choices(rates, s, others, label):
@@ -101,11 +101,11 @@ def _is_possible(rest, S, ways):
 def _meetings(s, zero, grid, wrt):
     """Labels where c = 0 and either mode is possible: the first time, and where a slide begins."""
     first, before = wrt.first(), False
-    if first in s.c and abs(value(s.c[first])) <= zero:
+    if first in s.c and abs(s.values[first]) <= zero:
         yield first
     for element in grid.elements:
         label = element.points[0]
-        slides = label in s.c and SLIDING < s.nu[label].value < 1 - SLIDING and abs(value(s.c[label])) <= zero
+        slides = label in s.c and abs(s.values[label]) <= zero and SLIDING < s.nu[label].value < 1 - SLIDING
         if slides and not before:
             yield label
         before = slides
