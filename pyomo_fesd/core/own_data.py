@@ -13,15 +13,16 @@ from pyomo.core import Block, Var
 def own_components(block: Block, ctype, descend_into, active: bool | None = None) -> Iterator:
     """Yield the components of type ``ctype`` that are no References; the parameters and the order are those of Pyomo's walks."""
     wanted, places = (set(types) if isinstance(types, tuple) else {types} for types in (ctype, descend_into))
+    # Disjuncts are many, and most have none of the types: Pyomo takes longer to make a map than to read it
+    declared, inner = block.component_map(wanted, active), block.component_map(places, active)
     waiting = [block] if active is None or block.active == active else []
     while waiting:
-        place = waiting.pop()
-        # most Disjuncts have none of the types, and Pyomo takes twenty times as long to find that out
+        declared._block = inner._block = place = waiting.pop()
         if not wanted.isdisjoint(place._ctypes):
-            yield from (c for c in place.component_map(wanted, active).values() if not _is_reference(c))
+            yield from (c for c in declared.values() if not _is_reference(c))
         if not places.isdisjoint(place._ctypes):
-            inner = (c for c in place.component_map(places, active).values() if not _is_reference(c))
-            waiting += reversed([b for c in inner for b in c.values() if active is None or b.active == active])
+            found = (b for c in inner.values() if not _is_reference(c) for b in c.values())
+            waiting += reversed([b for b in found if active is None or b.active == active])
 
 
 def _is_reference(component):
@@ -36,10 +37,8 @@ def own_data(block: Block, ctype, descend_into, active: bool | None = None) -> I
 
 def data_of(component) -> Iterable:
     """Return the data of a component."""
-    if component.is_indexed():
-        return component.values()
     # of a flowsheet over time most are scalar; ``values`` takes three times as long
-    return (component,) if len(component) else ()
+    return component.values() if component.is_indexed() else (component,) * len(component)
 
 
 def variables_below(block: Block, active: bool | None = None) -> Iterator:

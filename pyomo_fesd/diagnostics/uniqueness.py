@@ -16,7 +16,7 @@ alone.  Where more than MOST surfaces meet, the other multipliers stay as they a
 
 from collections import defaultdict
 from collections.abc import Iterator
-from itertools import product
+from itertools import chain, product
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
@@ -29,10 +29,12 @@ from scipy.sparse.linalg import lsqr
 from pyomo_fesd.core import (
     TimeIndex,
     all_switched_systems,
+    data_of,
     derivatives,
     gradient,
     is_discretisation_equation,
     moving_grids,
+    own_components,
 )
 from pyomo_fesd.results import SwitchingFunction, largest_value, physical_time
 
@@ -121,8 +123,9 @@ class _Rates:
         self._given = ComponentSet([*systems.selectors, *systems.continuous, *held])
         self._conditions = moving.complementarities
         self._rows, self._linear, times = defaultdict(list), {}, TimeIndex(wrt)
-        for c in model.component_data_objects(Constraint, active=True, descend_into=Block):
-            if c.equality and not is_discretisation_equation(c):
+        rows = (c for c in own_components(model, Constraint, Block, active=True) if not is_discretisation_equation(c))
+        for c in chain.from_iterable(map(data_of, rows)):
+            if c.active and c.equality:
                 self._rows[times.time(c)].append(c)
 
     def rate(self, s, label):
