@@ -125,7 +125,10 @@ class TimeIndex:
         """Time label of ``data``, or None; of a whole indexed component, as a Suffix may hold, that of the block it is on."""
         component = data.parent_component()
         _, _, inner, _, position = self._place(component)
-        return inner if position is None or _is_whole(data) else index_tuple(data._index)[position]
+        if position is None or (data is component and data.is_indexed()):
+            return inner
+        index = data._index
+        return index[position] if index.__class__ is tuple else index
 
     def at(self, data, label):
         """The data, or the whole component, of the same name at another time; None if ``data`` has no time."""

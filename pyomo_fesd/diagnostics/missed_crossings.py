@@ -12,7 +12,7 @@ Does not apply: to sides of a hand-written Complementarity.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from pyomo.common.collections import ComponentMap
@@ -99,13 +99,19 @@ def _kept(moving, functions):
     for mode in [] if moving.hysteresis is None else moving.hysteresis.modes:
         for k in range(min(map(len, mode.conditions.values()))):
             by_label = {t: conditions[k] for t, conditions in mode.conditions.items()}
-            yield _Kept(mode.title, by_label, _numbers(by_label), lambda _, element, mode=mode: int(value(mode.weight(element)) > 0.5))
+            sign = partial(_sign_of_mode, mode)
+            yield _Kept(mode.title, by_label, _numbers(by_label), sign)
     for jump in [] if moving.state_jumps is None else moving.state_jumps.laws:
         yield _Kept(jump.name, jump.guards, _numbers(jump.guards), lambda _, element: 1)
 
 
 def _numbers(by_label):
     return {label: number_of(function) for label, function in by_label.items()}
+
+
+def _sign_of_mode(mode, kept, element):
+    """1 where a mode is on; else its conditions do not count."""
+    return int(value(mode.weight(element)) > 0.5)
 
 
 def _sign(kept, element):

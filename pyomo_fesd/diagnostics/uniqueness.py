@@ -20,7 +20,7 @@ from itertools import chain, product
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, Constraint, value
+from pyomo.core import Block, Constraint
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import ContinuousSet
 from scipy.sparse import csr_matrix, diags

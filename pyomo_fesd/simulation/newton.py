@@ -55,7 +55,7 @@ class NewtonSystem:
         for _ in range(ITERATIONS):
             V, J = self._residuals.evaluate(w)
             residual, entries = V[self._rows], J[self._entries]
-            if not isfinite(residual.sum() + entries.sum()):
+            if not isfinite(residual @ residual + entries @ entries):
                 return None
             terms = np.bincount(self._i, np.abs(entries * w[self._factor_of_entry]), self._shape[0])
             error = (np.abs(residual) / (EXACT * terms + TINY)).max(initial=0.0)
