@@ -14,15 +14,15 @@ def own_components(block: Block, ctype, descend_into, active: bool | None = None
     """Yield the components of type ``ctype`` that are no References; the parameters and the order are those of Pyomo's walks."""
     wanted, places = (set(types) if isinstance(types, tuple) else {types} for types in (ctype, descend_into))
     # Disjuncts are many, and most have none of the types: Pyomo takes longer to make a map than to read it
-    declared, inner = block.component_map(wanted, active), block.component_map(places, active)
+    declared, inner, met = block.component_map(wanted, active), block.component_map(places, active), wanted | places
     waiting = [block] if active is None or block.active == active else []
     while waiting:
         declared._block = inner._block = place = waiting.pop()
         if not wanted.isdisjoint(place._ctypes):
             yield from (c for c in declared.values() if not _is_reference(c))
         if not places.isdisjoint(place._ctypes):
-            found = (b for c in inner.values() if not _is_reference(c) for b in c.values())
-            waiting += reversed([b for b in found if active is None or b.active == active])
+            found = [b for c in inner.values() if not _is_reference(c) for b in c.values() if not met.isdisjoint(b._ctypes)]
+            waiting += [b for b in reversed(found) if active is None or b.active == active]
 
 
 def _is_reference(component):

@@ -38,11 +38,11 @@ INSIDE = np.linspace(0.0, 1.0, 202)[1:-1]
 def missed_crossings(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
     """Yield messages for elements in which a function has the wrong sign between collocation points."""
     moving = moving_grids(model)[wrt]
-    time, after = moving.physical_time(), _values_after_jumps(model, wrt)
+    after = _values_after_jumps(model, wrt)
     for f in _kept(moving, functions):
         found = next(filter(None, (_crossing(f, element, moving.grid, after) for element in moving.grid.elements)), None)
         if found is not None:
-            element, crossing = found
+            (element, crossing), time = found, moving.physical_time()
             when = time[element.left] + crossing * (time[element.right] - time[element.left])
             yield (
                 f"{f.name}: near time {when:.6g} the solution leaves its region between two collocation points and comes back, "

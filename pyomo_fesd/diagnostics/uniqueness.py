@@ -16,7 +16,7 @@ alone.  Where more than MOST surfaces meet, the other multipliers stay as they a
 
 from collections import defaultdict
 from collections.abc import Iterator
-from itertools import chain, product
+from itertools import product
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
@@ -29,7 +29,6 @@ from scipy.sparse.linalg import lsqr
 from pyomo_fesd.core import (
     TimeIndex,
     all_switched_systems,
-    data_of,
     derivatives,
     gradient,
     is_discretisation_equation,
@@ -122,11 +121,8 @@ class _Rates:
         held = [v for c in (moving.held or {}).values() for v in identify_variables(c.body)]
         self._given = ComponentSet([*systems.selectors, *systems.continuous, *held])
         self._conditions = moving.complementarities
-        self._rows, self._linear, times = defaultdict(list), {}, TimeIndex(wrt)
         rows = (c for c in own_components(model, Constraint, Block, active=True) if not is_discretisation_equation(c))
-        for c in chain.from_iterable(map(data_of, rows)):
-            if c.active and c.equality:
-                self._rows[times.time(c)].append(c)
+        self._families, self._linear = list(TimeIndex(wrt).families_in(rows).values()), {}
 
     def rate(self, s, label):
         """Return cdot at ``label``, of a switching function of states."""
@@ -178,7 +174,9 @@ class _Rates:
     def _linearised(self, label):
         """Columns and Jacobian of the unknowns in the equations at ``label``; by id, rows and entries of the other variables."""
         columns, entries, others, number = ComponentMap(), [], defaultdict(list), 0
-        for c in self._rows[label]:
+        for c in (by_time[label] for by_time in self._families if label in by_time):
+            if not (c.active and c.equality):
+                continue
             variables = list(identify_variables(c.body))
             unknown = [self._unknown(v) for v in variables]
             if not any(unknown):

@@ -35,12 +35,12 @@ def varied_inputs(model: Block, wrt: ContinuousSet, functions: list[SwitchingFun
     moving = moving_grids(model)[wrt]
     if all(r.fixed for r in moving.r.values()):
         return
-    time, found = moving.physical_time(), 0
+    found = 0
     for name, by_time in _fixed(model, wrt):
         first = next(filter(None, (_varied(by_time, stage) for stage in _stages(moving))), None)
         if first is not None and found < SHOWN:
             found += 1
-            labels, step = first
+            (labels, step), time = first, moving.physical_time()
             remedy = AT_THE_END.format(time=time[step]) if step == labels[-1] else INSIDE
             yield (
                 f"{strip_time(name)}: it is fixed to {by_time[labels[0]].value:.6g} and, from the label {step:g} on, to "
