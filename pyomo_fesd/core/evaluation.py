@@ -9,16 +9,40 @@ from pyomo.common.numeric_types import native_numeric_types
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
 from pyomo.core import value
 from pyomo.core.base.var import VarData
-from pyomo.core.expr import ProductExpression
+from pyomo.core.expr import LinearExpression, MonomialTermExpression, NegationExpression, ProductExpression, SumExpression
 from pyomo.core.expr.visitor import identify_mutable_parameters
 
 from pyomo_fesd.core.interruption import DeferredInterrupt
+
+#: Operations that are evaluated without Pyomo's visitor, which takes longer to set up than they do.
+ARITHMETIC = {LinearExpression, MonomialTermExpression, NegationExpression, ProductExpression, SumExpression}
+
+
+def number_of(expr) -> float:
+    """Return the value of an expression as Pyomo's ``value`` does, in half of its time where it consists of sums and products."""
+    found = _number(expr)
+    return value(expr) if found is None else found
+
+
+def _number(expr):
+    """The value, or None where a variable has none."""
+    kind = expr.__class__
+    if kind is VarData:
+        return expr.value
+    if kind not in ARITHMETIC:
+        return expr if kind in native_numeric_types else value(expr, exception=False)
+    try:
+        return expr._apply_operation([_number(arg) for arg in expr.args])
+    except TypeError:
+        return None
+    except RecursionError:
+        return value(expr, exception=False)
 
 
 def value_or_nan(expr) -> float:
     """Value of ``expr`` at the present values of its variables; NaN where it is undefined."""
     try:
-        found = None if expr is None else value(expr, exception=False)
+        found = None if expr is None else _number(expr)
     except (ArithmeticError, ValueError, NotImplementedError):
         # Pyomo cannot evaluate a PiecewiseLinearFunction
         found = None

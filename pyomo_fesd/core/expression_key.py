@@ -27,8 +27,8 @@ DETAILS = {
 
 
 @cache
-def _detail(cls):
-    """The function that reads the detail of the nodes of a class; None for a class that is not in ``DETAILS``."""
+def detail_of(cls):
+    """Return the function that reads the detail of the nodes of a class; None for a class that is not in ``DETAILS``."""
     return next((detail for known, detail in DETAILS.items() if issubclass(cls, known)), None)
 
 
@@ -50,7 +50,7 @@ def prefix_tokens(expressions, leaf, number=None) -> tuple:
     tokens, waiting = [], list(expressions)[::-1]
     while waiting:
         node = waiting.pop()
-        detail = _detail(node.__class__)
+        detail = detail_of(node.__class__)
         if node.__class__ in native_types:
             tokens.append(node if number is None else number(node))
         elif detail is not None:

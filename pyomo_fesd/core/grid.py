@@ -56,7 +56,7 @@ class Element:
         """Nominal length hbar_n, in labels of the ContinuousSet."""
         return self.right - self.left
 
-    @property
+    @cached_property
     def own_labels(self) -> tuple[float, ...]:
         """Labels of the collocation points and of the right boundary, each once."""
         return tuple(dict.fromkeys((*self.points, self.right)))

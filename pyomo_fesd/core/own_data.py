@@ -5,20 +5,40 @@ Leaves: nothing.
 Does not apply: where the user has named components, which may be References.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from pyomo.core import Block, Var
 
 
+def own_components(block: Block, ctype, descend_into, active: bool | None = None) -> Iterator:
+    """Yield the components of type ``ctype`` that are no References; the parameters and the order are those of Pyomo's walks."""
+    wanted, places = (set(types) if isinstance(types, tuple) else {types} for types in (ctype, descend_into))
+    # Disjuncts are many, and most have none of the types: Pyomo takes longer to make a map than to read it
+    declared, inner, met = block.component_map(wanted, active), block.component_map(places, active), wanted | places
+    waiting = [block] if active is None or block.active == active else []
+    while waiting:
+        declared._block = inner._block = place = waiting.pop()
+        if not wanted.isdisjoint(place._ctypes):
+            yield from (c for c in declared.values() if not _is_reference(c))
+        if not places.isdisjoint(place._ctypes):
+            found = [b for c in inner.values() if not _is_reference(c) for b in c.values() if not met.isdisjoint(b._ctypes)]
+            waiting += [b for b in reversed(found) if active is None or b.active == active]
+
+
+def _is_reference(component):
+    return component.is_indexed() and component.is_reference()
+
+
 def own_data(block: Block, ctype, descend_into, active: bool | None = None) -> Iterator:
-    """Yield the data of the components of type ``ctype`` that are no References; the parameters are those of Pyomo's walks."""
-    for component in block.component_objects(ctype, active=active, descend_into=descend_into):
-        if not component.is_indexed():
-            # of a flowsheet over time most are scalar; ``values`` takes three times as long
-            if len(component):
-                yield component
-        elif not component.is_reference():
-            yield from component.values()
+    """Yield the data of these components."""
+    for component in own_components(block, ctype, descend_into, active):
+        yield from data_of(component)
+
+
+def data_of(component) -> Iterable:
+    """Return the data of a component."""
+    # of a flowsheet over time most are scalar; ``values`` takes three times as long
+    return component.values() if component.is_indexed() else (component,) * len(component)
 
 
 def variables_below(block: Block, active: bool | None = None) -> Iterator:

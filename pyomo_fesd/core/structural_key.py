@@ -8,11 +8,11 @@ Does not apply: to expressions that are equal by algebra only; their keys differ
 from collections.abc import Iterable
 
 from pyomo.common.collections import ComponentSet
-from pyomo.common.numeric_types import native_numeric_types
+from pyomo.common.numeric_types import native_numeric_types, native_types
 from pyomo.core import value
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core.expression_key import prefix_tokens
+from pyomo_fesd.core.expression_key import detail_of
 
 
 def variables_of(expressions: Iterable) -> ComponentSet:
@@ -55,20 +55,33 @@ class StructuralKey:
 
     def append(self, expr, number=nine_digits) -> None:
         """Append the tokens of ``expr``; ``number`` is a function from a number to its token."""
+        self.extend([expr], number)
 
-        def leaf(node):
-            if node.is_variable_type():
-                return self._position(node), ()
-            if node.is_named_expression_type():
-                return None, (node.expr,)
-            if node.is_expression_type():
-                return (node.__class__, getattr(node, '_name', None), node.nargs()), node.args
-            return number(value(node, exception=False)), ()
-
-        self.tokens += prefix_tokens([expr], leaf, number)
-
-    def _position(self, v):
-        if id(v) not in self._positions:
-            self._positions[id(v)] = len(self.variables)
-            self.variables.append(v)
-        return self._positions[id(v)]
+    def extend(self, expressions: Iterable, number=nine_digits) -> None:
+        """Append the tokens of some expressions, in prefix notation."""
+        # a reader of equations spends most of its time here
+        tokens, variables, positions, waiting = self.tokens, self.variables, self._positions, list(expressions)[::-1]
+        while waiting:
+            node = waiting.pop()
+            kind = node.__class__
+            if kind in native_types:
+                tokens.append(number(node))
+                continue
+            detail = detail_of(kind)
+            if detail is not None:
+                arguments = node.args
+                tokens.append((kind, len(arguments), detail(node)))
+                waiting.extend(arguments[::-1])
+            elif id(node) in positions:
+                tokens.append(positions[id(node)])
+            elif node.is_variable_type():
+                tokens.append(positions.setdefault(id(node), len(variables)))
+                variables.append(node)
+            elif node.is_named_expression_type():
+                tokens.append(None)
+                waiting.append(node.expr)
+            elif node.is_expression_type():
+                tokens.append((kind, getattr(node, '_name', None), node.nargs()))
+                waiting.extend(node.args[::-1])
+            else:
+                tokens.append(number(value(node, exception=False)))

@@ -12,7 +12,7 @@ Does not apply: to sides of a hand-written Complementarity.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from pyomo.common.collections import ComponentMap
@@ -21,7 +21,7 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import ContinuousSet
 from scipy.interpolate import BarycentricInterpolator
 
-from pyomo_fesd.core import interpolation_weights, kept_values, moving_grids
+from pyomo_fesd.core import interpolation_weights, kept_values, moving_grids, number_of
 from pyomo_fesd.results import SwitchingFunction, jumps_that_happen, largest_value
 
 #: A function below this part of its largest value is zero all along an element.
@@ -38,11 +38,11 @@ INSIDE = np.linspace(0.0, 1.0, 202)[1:-1]
 def missed_crossings(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
     """Yield messages for elements in which a function has the wrong sign between collocation points."""
     moving = moving_grids(model)[wrt]
-    time, after = moving.physical_time(), _values_after_jumps(model, wrt)
+    after = _values_after_jumps(model, wrt)
     for f in _kept(moving, functions):
         found = next(filter(None, (_crossing(f, element, moving.grid, after) for element in moving.new_elements)), None)
         if found is not None:
-            element, crossing = found
+            (element, crossing), time = found, moving.physical_time()
             when = time[element.left] + crossing * (time[element.right] - time[element.left])
             yield (
                 f"{f.name}: near time {when:.6g} the solution leaves its region between two collocation points and comes back, "
@@ -63,6 +63,7 @@ class _Kept:
     ----------
     name : str
     by_label : dict label -> expression
+    numbers : dict label -> value
     sign : callable (kept, element) -> 1, -1, or 0 where the function slides or is not kept
     nu : dict label -> VarData or None
         the multiplier of a switching function
@@ -70,13 +71,9 @@ class _Kept:
 
     name: str
     by_label: dict
+    numbers: dict
     sign: Callable
     nu: dict | None = None
-
-    @cached_property
-    def numbers(self):
-        """Values by label."""
-        return {label: value(function) for label, function in self.by_label.items()}
 
     @cached_property
     def zero(self):
@@ -99,13 +96,23 @@ class _Kept:
 def _kept(moving, functions):
     """Switching functions, conditions of modes with hysteresis, and guards."""
     for s in functions:
-        yield _Kept(s.name, s.c, _sign, s.nu)
+        yield _Kept(s.name, s.c, s.values, _sign, s.nu)
     for mode in [] if moving.hysteresis is None else moving.hysteresis.modes:
         for k in range(min(map(len, mode.conditions.values()))):
             by_label = {t: conditions[k] for t, conditions in mode.conditions.items()}
-            yield _Kept(mode.title, by_label, lambda _, element, mode=mode: int(value(mode.weight(element)) > 0.5))
+            sign = partial(_sign_of_mode, mode)
+            yield _Kept(mode.title, by_label, _numbers(by_label), sign)
     for jump in [] if moving.state_jumps is None else moving.state_jumps.laws:
-        yield _Kept(jump.name, jump.guards, lambda _, element: 1)
+        yield _Kept(jump.name, jump.guards, _numbers(jump.guards), lambda _, element: 1)
+
+
+def _numbers(by_label):
+    return {label: number_of(function) for label, function in by_label.items()}
+
+
+def _sign_of_mode(mode, kept, element):
+    """1 where a mode is on; else its conditions do not count."""
+    return int(value(mode.weight(element)) > 0.5)
 
 
 def _sign(kept, element):
@@ -119,9 +126,10 @@ def _crossing(kept, element, grid, after):
     labels, sign = (element.left, *element.points), kept.sign(kept, element)
     if sign == 0 or any(t not in kept.by_label for t in labels):
         return None
-    at_points = np.array([sign * kept.numbers[t] for t in element.points])
-    largest = np.abs(at_points).max()
-    if largest <= kept.zero or at_points.min() > 2 * np.ptp(at_points):
+    at_points = [sign * kept.numbers[t] for t in element.points]
+    low, high = min(at_points), max(at_points)
+    largest = max(-low, high)
+    if largest <= kept.zero or low > 2 * (high - low):
         return None  # zero throughout, or far from zero
     functions, jumping = [kept.by_label[t] for t in labels], after.get(element.n, ComponentMap())
     at_nodes = _interpolated_between_points(functions, np.array([0.0, *grid.tau]), jumping)

@@ -1,6 +1,7 @@
 """Post-solve diagnostics that the certificate does not cover."""
 
 import logging
+from dataclasses import replace
 from functools import cache, partial
 
 from pyomo.core import Block
@@ -66,8 +67,10 @@ class MarchReview:
 
     def look(self) -> None:
         """Log warnings about the elements on the grid."""
+        # a function keeps the values of its first use
+        functions = cache(lambda: [replace(function) for function in self._functions()])
         for name in self._checks:
-            for message in _messages(name, CHECKS[name], self._model, self._wrt, self._functions):
+            for message in _messages(name, CHECKS[name], self._model, self._wrt, functions):
                 subject = name, message.partition(':')[0]
                 if subject not in self._said:
                     self._said.add(subject)

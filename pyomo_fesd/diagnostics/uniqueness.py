@@ -20,7 +20,7 @@ from itertools import product
 
 import numpy as np
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, Constraint, value
+from pyomo.core import Block, Constraint
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import ContinuousSet
 from scipy.sparse import csr_matrix, diags
@@ -33,6 +33,7 @@ from pyomo_fesd.core import (
     gradient,
     is_discretisation_equation,
     moving_grids,
+    own_components,
 )
 from pyomo_fesd.results import SwitchingFunction, largest_value, physical_time
 
@@ -48,7 +49,7 @@ def not_unique(model: Block, wrt: ContinuousSet, functions: list[SwitchingFuncti
     """Yield messages for boundaries from which both modes lead away."""
     moving, time, rates = moving_grids(model)[wrt], None, None
     # those of one Disjunction have the same name
-    zeros = {id(s): ZERO * largest_value(s.c) for s in functions}
+    zeros = {id(s): ZERO * largest_value(s.values) for s in functions}
     for s in functions:
         for label in _meetings(s, zeros[id(s)], moving):
             rates = rates or _Rates(model, wrt)
@@ -64,7 +65,7 @@ def not_unique(model: Block, wrt: ContinuousSet, functions: list[SwitchingFuncti
 def _others(s, functions, zeros, label):
     """The other switching functions that are zero at ``label``."""
     there = (o for o in functions if o is not s and label in o.c)
-    return [o for o in there if abs(value(o.c[label])) <= zeros[id(o)]]
+    return [o for o in there if abs(o.values[label]) <= zeros[id(o)]]
 
 
 def _leaves_choices(rates, s, others, label):
@@ -101,11 +102,11 @@ def _is_possible(rest, S, ways):
 def _meetings(s, zero, moving):
     """Labels where c = 0 and either mode is possible: the first time, and where a slide begins."""
     first, before = moving.wrt.first(), False
-    if moving.begin in (None, first) and first in s.c and abs(value(s.c[first])) <= zero:
+    if moving.begin in (None, first) and first in s.c and abs(s.values[first]) <= zero:
         yield first
     for element in moving.grid.elements:
         label = element.points[0]
-        slides = label in s.c and SLIDING < s.nu[label].value < 1 - SLIDING and abs(value(s.c[label])) <= zero
+        slides = label in s.c and abs(s.values[label]) <= zero and SLIDING < s.nu[label].value < 1 - SLIDING
         if slides and not before and element in moving.new_elements:
             yield label
         before = slides
@@ -120,10 +121,8 @@ class _Rates:
         held = [v for c in (moving.held or {}).values() for v in identify_variables(c.body)]
         self._given = ComponentSet([*systems.selectors, *systems.continuous, *held])
         self._conditions = moving.complementarities
-        self._rows, self._linear, times = defaultdict(list), {}, TimeIndex(wrt)
-        for c in model.component_data_objects(Constraint, active=True, descend_into=Block):
-            if c.equality and not is_discretisation_equation(c):
-                self._rows[times.time(c)].append(c)
+        rows = (c for c in own_components(model, Constraint, Block, active=True) if not is_discretisation_equation(c))
+        self._families, self._linear = list(TimeIndex(wrt).families_in(rows).values()), {}
 
     def rate(self, s, label):
         """Return cdot at ``label``, of a switching function of states."""
@@ -175,7 +174,9 @@ class _Rates:
     def _linearised(self, label):
         """Columns and Jacobian of the unknowns in the equations at ``label``; by id, rows and entries of the other variables."""
         columns, entries, others, number = ComponentMap(), [], defaultdict(list), 0
-        for c in self._rows[label]:
+        for c in (by_time[label] for by_time in self._families if label in by_time):
+            if not (c.active and c.equality):
+                continue
             variables = list(identify_variables(c.body))
             unknown = [self._unknown(v) for v in variables]
             if not any(unknown):

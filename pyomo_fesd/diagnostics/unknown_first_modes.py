@@ -20,7 +20,16 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct, Disjunction
 
-from pyomo_fesd.core import TimeIndex, all_switched_systems, derivatives, exchanged, moving_grids, strip_time, value_or_nan
+from pyomo_fesd.core import (
+    TimeIndex,
+    all_switched_systems,
+    derivatives,
+    exchanged,
+    moving_grids,
+    own_components,
+    strip_time,
+    value_or_nan,
+)
 from pyomo_fesd.results import SwitchingFunction
 
 #: A mode is active where its multiplier is larger.
@@ -58,7 +67,7 @@ def unknown_first_modes(model: Block, wrt: ContinuousSet, functions: list[Switch
 def _of_disjunctions(model, times, point) -> Iterator[tuple]:
     """``(name, conditions of the active modes at a point, remedy)`` of every Disjunction that is not stated at the first time."""
     multipliers = all_switched_systems(model).multipliers
-    for name, by_time in times.families(model.component_data_objects(Disjunction, descend_into=(Block, Disjunct))).items():
+    for name, by_time in times.families_in(own_components(model, Disjunction, (Block, Disjunct))).items():
         if times.wrt.first() not in by_time and point in by_time:
             yield strip_time(name), _regions(by_time[point], multipliers), REGIONS
 

@@ -15,7 +15,7 @@ from pyomo.core import Block, Var
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import MovingGrid, TimeIndex, is_generated, moving_grids, own_data, signals, strip_time
+from pyomo_fesd.core import MovingGrid, TimeIndex, data_of, is_generated, moving_grids, own_components, signals, strip_time
 from pyomo_fesd.results import SwitchingFunction
 
 #: Relative difference of values that are equal.
@@ -35,12 +35,12 @@ def varied_inputs(model: Block, wrt: ContinuousSet, functions: list[SwitchingFun
     moving = moving_grids(model)[wrt]
     if all(r.fixed for r in moving.r.values()):
         return
-    time, found = moving.physical_time(), 0
+    found = 0
     for name, by_time in _fixed(model, wrt):
         first = next(filter(None, (_varied(by_time, stage) for stage in _stages(moving))), None)
         if first is not None and found < SHOWN:
             found += 1
-            labels, step = first
+            (labels, step), time = first, moving.physical_time()
             remedy = AT_THE_END.format(time=time[step]) if step == labels[-1] else INSIDE
             yield (
                 f"{strip_time(name)}: it is fixed to {by_time[labels[0]].value:.6g} and, from the label {step:g} on, to "
@@ -51,7 +51,8 @@ def varied_inputs(model: Block, wrt: ContinuousSet, functions: list[SwitchingFun
 def _fixed(model, wrt):
     """``(name, {label: data})`` of the user's variables over time that are fixed after the first time."""
     known, first = ComponentSet(signals(wrt)), wrt.first()
-    fixed = (v for v in own_data(model, Var, descend_into=(Block, Disjunct)) if v.fixed and v.value is not None)
+    own = own_components(model, Var, (Block, Disjunct))
+    fixed = (v for component in own for v in data_of(component) if v.fixed and v.value is not None)
     for name, by_time in TimeIndex(wrt).families(fixed).items():
         one = next(iter(by_time.values()))
         if one.parent_component() not in known and not is_generated(one):

@@ -18,6 +18,7 @@ from pyomo_fesd.core import (
     all_switched_systems,
     is_generated,
     moving_grids,
+    own_components,
     read_complementarity,
     strip_time,
     value_or_nan,
@@ -39,11 +40,11 @@ def complementarity_modes(model: Block, wrt: ContinuousSet, times: TimeIndex) ->
     Those that ``fesd.finite_elements`` has aggregated are inactive except at the first time; others that are inactive are left out.
     """
     contacts = ComponentMap((contact.touching, contact) for contact in all_switched_systems(model).contacts)
-    own = (c for c in model.component_data_objects(Complementarity, descend_into=Block) if not is_generated(c))
+    own = (c for c in own_components(model, Complementarity, Block) if not is_generated(c))
     moving, found = moving_grids(model).get(wrt), {}
     splits = {} if moving is None else moving.splits
     summed = ComponentSet() if moving is None else ComponentSet(c for some in moving.sources.values() for c in some)
-    for name, by_time in times.families(own).items():
+    for name, by_time in times.families_in(own).items():
         if any(c.active or c in summed for c in by_time.values()):
             present = {t: c for t, c in by_time.items() if moving is not None or c.active}
             touching = contacts.get(next(iter(present.values())))

@@ -1,11 +1,12 @@
 """Switching functions with one multiplier (theory, eq. 5), from the steps that ``fesd.dcs`` recorded."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
-from pyomo.core import Block, value
+from pyomo.core import Block
 from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import TimeIndex, all_switched_systems, source_name
+from pyomo_fesd.core import TimeIndex, all_switched_systems, number_of, source_name
 
 #: A function that is nowhere larger than this is zero.
 LEAST = 1e-3
@@ -28,6 +29,11 @@ class SwitchingFunction:
     nu: dict
     c: dict
 
+    @cached_property
+    def values(self) -> dict[float, float]:
+        """The values of c by label, of the time of the first use."""
+        return {label: number_of(c) for label, c in self.c.items()}
+
 
 def switching_functions(model: Block, wrt: ContinuousSet) -> list[SwitchingFunction]:
     """Return the switching functions of a transformed model; Stewart's lam belong to modes, so that form has none."""
@@ -35,11 +41,12 @@ def switching_functions(model: Block, wrt: ContinuousSet) -> list[SwitchingFunct
     for step in all_switched_systems(model).steps:
         label, name = times.split(step.nu)
         if label is not None:
-            function = found.setdefault(name, SwitchingFunction(source_name(name), {}, {}))
-            function.nu[label], function.c[label] = step.nu, step.c
+            if name not in found:
+                found[name] = SwitchingFunction(source_name(name), {}, {})
+            found[name].nu[label], found[name].c[label] = step.nu, step.c
     return list(found.values())
 
 
-def largest_value(functions: dict) -> float:
-    """Return the largest value of a function of time, given as {label: expression}; at least LEAST, the inaccuracy of a zero."""
-    return max([LEAST, *(abs(value(c)) for c in functions.values())])
+def largest_value(numbers: dict[float, float]) -> float:
+    """Return the largest value of a function of time, given as {label: number}; at least LEAST, the inaccuracy of a zero."""
+    return max([LEAST, *map(abs, numbers.values())])

@@ -17,7 +17,7 @@ from pyomo_fesd.core import (
     find_continuous_set,
     is_generated,
     moving_grids,
-    own_data,
+    own_components,
     strip_time,
     value_or_nan,
 )
@@ -94,9 +94,9 @@ def trajectory(model: Block, wrt: ContinuousSet | None = None) -> pd.DataFrame:
 def columns_over_time(model: Block, wrt: ContinuousSet) -> Iterator[Column]:
     """Yield the columns of a trajectory: variables and expressions, then the multipliers of modes."""
     times = TimeIndex(wrt)
-    for name, by_time in times.families(own_data(model, (Var, Expression), descend_into=Block)).items():
-        if not is_generated(next(iter(by_time.values()))):
-            yield Column(strip_time(name), None, by_time)
+    own = (c for c in own_components(model, (Var, Expression), Block) if not is_generated(c))
+    for name, by_time in times.families_in(own).items():
+        yield Column(strip_time(name), None, by_time)
     systems = disjunction_modes(model, times) | complementarity_positions(model, wrt, times, elements_if_any(wrt))
     for name, modes in systems.items():
         for mode, weights in modes.items():

@@ -85,6 +85,7 @@ def known_values(equations: ElementEquations) -> list[float]:
 
 def write_values(equations: ElementEquations, values: Sequence[float]) -> None:
     """Write ``values`` of the unknowns into the user's model; the caller sets the length multiplier."""
+    length = equations.length
     for v, number in zip(equations.unknown, values):
-        if v is not equations.length:
+        if v is not length:
             v.set_value(number, skip_validation=True)

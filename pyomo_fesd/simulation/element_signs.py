@@ -62,6 +62,8 @@ class ElementSigns:
     def _negative_between(possible, values, polynomials):
         """Which of the possible functions have an interpolant that is clearly negative."""
         found, rows = possible.copy(), values[possible]
+        if not rows.size:
+            return found
         found[possible] = (rows @ polynomials).min(axis=1, initial=np.inf) < -DIP * np.abs(rows).max(axis=1, initial=0.0)
         return found
 

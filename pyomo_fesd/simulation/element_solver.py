@@ -1,9 +1,12 @@
 """Solve one element after the other, each up to the next switch, the end of a mode with hysteresis, or a state jump."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from pyomo_fesd.core import Element, TimeIndex, derivatives, moving_grids, phase
+from pyomo.core import Block, Var
+from pyomo.core.base.var import VarData
+
+from pyomo_fesd.core import Element, TimeIndex, derivatives, moving_grids, own_data, phase
 from pyomo_fesd.simulation.determinacy import refuse_undetermined, refuse_undetermined_start
 from pyomo_fesd.simulation.element_class import ElementClass, ElementEnd, LeftBoundary
 from pyomo_fesd.simulation.equation_reader import EquationReader
@@ -109,6 +112,16 @@ class ElementSolver:
         for modes in self._hysteresis:
             modes.set_multipliers(self._grid, self._first)
         self._reader.requirements.fulfil()
+
+    def written(self) -> Iterator[VarData]:
+        """Yield the variables that a pass writes, some of them repeatedly."""
+        for equations in self._equations.values():
+            yield from equations.unknown
+        yield from own_data(self._moving.block, Var, Block)
+        yield from self._reader.requirements.variables
+        for modes in self._hysteresis:
+            for element in self._grid.elements:
+                yield from modes.variables(element.right)
 
     def solve(self, element, aim: float, warm: bool) -> SimulatedElement:
         """Solve the next element, up to the length ``aim`` or the first event; ``warm`` as in ``TRIES``."""

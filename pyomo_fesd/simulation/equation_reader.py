@@ -6,7 +6,7 @@ Does not apply: to inequalities of the user and conditions like them (``requirem
 from collections import defaultdict
 from collections.abc import Container
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, groupby
 
 from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Constraint, value
@@ -20,10 +20,12 @@ from pyomo_fesd.core import (
     StructuralKey,
     TimeIndex,
     any_number,
+    data_of,
     derivatives,
     is_discretisation_equation,
     is_generated,
     nine_digits,
+    own_components,
     read_complementarity,
     variables_of,
 )
@@ -58,15 +60,17 @@ class EquationReader:
     def _read_rows(self):
         """Equations of the user and generated rows, by label."""
         between = None if self._moving.hysteresis is None else self._moving.hysteresis.block
-        for c in self._model.component_data_objects(Constraint, active=True, descend_into=Block):
-            label = self._label(c)
-            if label is not None and (c.equality or is_generated(c)) and c.parent_block() is not between:
-                self._rows_at[label].append(c)
+        for component in own_components(self._model, Constraint, Block, active=True):
+            generated = is_generated(component)
+            for c in data_of(component) if component.parent_block() is not between else ():
+                label = self._label(c, generated) if c.active and (generated or c.equality) else None
+                if label is not None:
+                    self._rows_at[label].append(c)
 
-    def _label(self, c):
+    def _label(self, c, generated):
         """The time of a row; an equation of the user without one, scalar or in a ConstraintList, may be one of the first time."""
         label = self._times.time(c)
-        return self._first if label is None and c.equality and not is_generated(c) and self._is_initial(c) else label
+        return self._first if label is None and not generated and self._is_initial(c) else label
 
     def _is_initial(self, equation):
         """Whether an equation contains variables of the first time, and of no other."""
@@ -146,11 +150,10 @@ class EquationReader:
     def _equations(self, constraints, event_functions, pairs, points, conditions, labels, chosen=()):
         """Assemble the record; ``chosen`` are unknowns whatever the equations contain, the length multiplier first."""
         key = StructuralKey()
-        for c in constraints:
+        for is_collocation, some in groupby(constraints, is_discretisation_equation):
             # labels are rounded, and so are the coefficients of collocation
-            key.append(c.expr, any_number if is_discretisation_equation(c) else nine_digits)
-        for expr in chain(*event_functions.values(), *pairs, *(pair for p in points.values() for pair in p.pairs)):
-            key.append(expr)
+            key.extend([c.expr for c in some], any_number if is_collocation else nine_digits)
+        key.extend(chain(*event_functions.values(), *pairs, *(pair for p in points.values() for pair in p.pairs)))
         unknown = self._unknown(key.variables, chosen, labels)
         positions = set(map(id, unknown))
         bounds = tuple(map(self._bounds, unknown))

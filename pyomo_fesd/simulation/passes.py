@@ -6,10 +6,7 @@ jump.  Where these need more elements than a control stage has, the next pass ke
 
 import logging
 
-from pyomo.core import Block, Var
-from pyomo.gdp import Disjunct
-
-from pyomo_fesd.core import FesdError, moving_grids, own_data, phase
+from pyomo_fesd.core import FesdError, moving_grids, phase
 from pyomo_fesd.finite_elements import refuse_first_mode
 from pyomo_fesd.simulation.element_solver import CUT, ElementSolver
 from pyomo_fesd.simulation.progress import Progress, TooFewElements, accumulation
@@ -30,7 +27,7 @@ class Simulation:
     """Element-by-element simulation on one moving grid; parameters as of ``simulate``, with a TimeIndex and a Deadline."""
 
     def __init__(self, model, times, inputs, options, timer, deadline):
-        self._model, self._timer = model, timer
+        self._timer = timer
         self._moving = moving_grids(model)[times.wrt]
         _refuse_sticking(self._moving.state_jumps)
         self._grid = self._moving.grid
@@ -46,8 +43,7 @@ class Simulation:
         self._fit_elements()
         if equilibration_is_active(self._moving):
             # another pass with the same plan may find other switches: it begins from other values
-            variables = own_data(self._model.model(), Var, (Block, Disjunct))
-            fitted, events = [(v, v.value, v.stale) for v in variables], self._progress.events
+            fitted, events = [(v, v.value, v.stale) for v in self._solver.written()], self._progress.events
             if not self._equalise():
                 self._put_back(fitted, events)
         self._warn_of_short_intervals()

@@ -5,7 +5,7 @@ from math import isnan
 import pyomo.environ as pyo
 import pytest
 
-from pyomo_fesd.core.evaluation import kept_values, known_sign, mutable_parameters, value_or_nan, value_or_zero
+from pyomo_fesd.core.evaluation import kept_values, known_sign, mutable_parameters, number_of, value_or_nan, value_or_zero
 
 
 @pytest.fixture
@@ -46,6 +46,37 @@ def test_undefined_values(m, write):
     m.x.value, m.z = 1.0, pyo.Var()
     expression = write and write(m)
     assert isnan(value_or_nan(expression)) and value_or_zero(expression) == 0.0
+
+
+@pytest.mark.parametrize(
+    'write',
+    [
+        lambda m: 3,
+        lambda m: m.x,
+        lambda m: m.p,
+        lambda m: m.e,
+        lambda m: 1.0 - m.x,
+        lambda m: m.x - 2 * (m.y - m.p * m.x) / 3 - m.e,
+        lambda m: -(m.x + 0.1) * (m.y + 0.2) * pyo.exp(m.x),
+        lambda m: sum(0.1 * k * m.x for k in range(9)) + m.x * m.y,
+    ],
+)
+def test_numbers_are_those_of_pyomo_to_the_last_digit(m, write):
+    m.x.value, m.e = 0.3, pyo.Expression(expr=m.x**2 + m.y)
+    assert number_of(write(m)) == value_or_nan(write(m)) == pyo.value(write(m))
+
+
+def test_the_number_of_a_variable_without_a_value_is_refused_as_pyomo_does(m):
+    for expression in (m.x, 1 - m.x):
+        with pytest.raises(ValueError):
+            number_of(expression)
+
+
+def test_products_of_very_many_factors_have_a_number(m):
+    product = m.y
+    for _ in range(2000):
+        product = product * m.y
+    assert number_of(product) == 1.0
 
 
 def test_an_infinite_value_counts_as_none_where_a_number_is_needed(m):

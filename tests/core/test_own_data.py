@@ -2,8 +2,9 @@
 
 import pyomo.environ as pyo
 import pytest
+from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core.own_data import own_data, variables_below
+from pyomo_fesd.core.own_data import own_components, own_data, variables_below
 
 
 @pytest.fixture
@@ -37,3 +38,22 @@ def test_blocks_that_are_not_active_are_left_out_on_request(m):
     m.b.deactivate()
     assert names(variables_below(m, active=True)) == ['x', 'y[1]', 'y[2]']
     assert len(names(variables_below(m))) == 5
+
+
+def test_components_come_in_the_order_of_pyomo_from_disjuncts_too():
+    m = pyo.ConcreteModel()
+    m.b = pyo.Block([1, 2], rule=lambda b, i: b.add_component('z', pyo.Var()))
+    m.d = Disjunct([1, 2])
+    m.d[1].inner = pyo.Block([1, 2], rule=lambda b, i: b.add_component('u', pyo.Var([1, 2])))
+    m.d[2].e = Disjunct()
+    m.d[2].e.v = pyo.Var()
+    m.x = pyo.Var()
+    places = (pyo.Block, Disjunct)
+    assert list(own_components(m, pyo.Var, places)) == list(m.component_objects(pyo.Var, descend_into=places))
+    assert names(own_components(m, (pyo.Var, pyo.Block), pyo.Block)) == ['b', 'x', 'b[1].z', 'b[2].z']
+
+
+def test_a_reference_to_a_block_is_no_place_of_its_own(m):
+    m.c = pyo.Block([1, 2], rule=lambda c, i: c.add_component('w', pyo.Var()))
+    m.once_more = pyo.Reference(m.c)
+    assert names(own_data(m, pyo.Var, pyo.Block))[-2:] == ['c[1].w', 'c[2].w']

@@ -50,6 +50,15 @@ def test_the_position_of_time_counts_the_places_before_it(m, sets, position):
     assert is_indexed_by(m.v, m.t) is (position is not None)
 
 
+def test_whole_components_are_grouped_as_their_data_are(m):
+    m.v, m.w, m.x, m.u = pyo.Var(m.i, m.t), pyo.Var(m.pairs, m.t, m.i), pyo.Var(m.t), pyo.Var(m.i)
+    m.b = pyo.Block(m.t, rule=lambda b, t: (b.add_component('y', pyo.Var(m.i)), b.add_component('z', pyo.Var()))[0])
+    components = list(m.component_objects(pyo.Var))
+    found, expected = TimeIndex(m.t).families_in(components), TimeIndex(m.t).families(m.component_data_objects(pyo.Var))
+    assert list(found) == list(expected) and len(found) == 10
+    assert all(list(found[name].items()) == list(expected[name].items()) for name in found)
+
+
 def test_a_product_that_was_made_before_is_taken_apart(m):
     m.grid = m.i * m.t
     m.v = pyo.Var(m.grid)
