@@ -47,6 +47,9 @@ class Coincidence:
         whether they also fall together with something that does not move, so that one change alone matters too
     before, after : VarData or None
         the extents of the places on both sides, whether changes can move past them or not
+    by_values_later, by_values_earlier : tuple of (ComplementarityData, ComplementarityData)
+        if changes come later, or earlier, the first pair has the values that the second one has in the solution, and its sides
+        follow from them: the zero side of the second one where only one side of that is zero, else any side
     """
 
     changes: tuple[Change, ...]
@@ -55,6 +58,8 @@ class Coincidence:
     fixed: bool = False
     before: VarData | None = None
     after: VarData | None = None
+    by_values_later: tuple[tuple[ComplementarityData, ComplementarityData], ...] = ()
+    by_values_earlier: tuple[tuple[ComplementarityData, ComplementarityData], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,11 +16,9 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pyomo.common.collections import ComponentSet
-
 from pyomo_fesd.core import Arrival, Element, MovingGrid, Option, Place, Toggle, homotopy_hints
 from pyomo_fesd.finite_elements.coincidences import switching_together
-from pyomo_fesd.finite_elements.neighbour_branches import PairsByPlace
+from pyomo_fesd.finite_elements.neighbour_branches import PairsByPlace, pairs_of_events
 
 #: Directions from the inside to the two ends.
 TO_FIRST, TO_LAST = -1, 1
@@ -75,7 +73,7 @@ def _families(moving):
 def _row(moving, places, end):
     """The elements of the control stage at an end, from there inwards."""
     stage = moving.grid.stages[end.element.stage]
-    inner, happening = stage[1:] if end.step is TO_FIRST else stage[-2::-1], _happening(moving)
+    inner, happening = stage[1:] if end.step is TO_FIRST else stage[-2::-1], pairs_of_events(moving)
     found = [Place(moving.r[end.element.n])]
     for e in inner:
         inside, between = places.inwards(e, end.step)
@@ -84,12 +82,6 @@ def _row(moving, places, end):
             between = [(pair, None if pair.parent_component() in happening else source) for pair, source in between]
         found.append(Place(moving.r[e.n], tuple(inside), tuple(between)))
     return tuple(found)
-
-
-def _happening(moving):
-    """Pairs whose first side is 0 at boundaries where nothing happens."""
-    hysteresis, jumps = moving.hysteresis, moving.state_jumps
-    return ComponentSet([*([hysteresis.leaving] if hysteresis else []), *([jumps.happens, jumps.binary] if jumps else [])])
 
 
 # conditions that elements sum up

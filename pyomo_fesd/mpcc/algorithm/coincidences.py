@@ -14,7 +14,7 @@ from itertools import permutations
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.arrivals import NONE, Entered, branches
+from pyomo_fesd.mpcc.algorithm.arrivals import Entered, branches
 from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND
 from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
 from pyomo_fesd.mpcc.algorithm.insertions import OrdersByInsertion
@@ -157,7 +157,7 @@ class Coincidences:
             verdicts.add(judge())
             if verdicts & {Verdict.IMPOSSIBLE, Verdict.NO_DESCENT}:
                 break
-        if order.place is not None and not verdicts <= {Verdict.IMPOSSIBLE, Verdict.NONE}:
+        if order.place is not None and Verdict.IMPOSSIBLE not in verdicts:
             possible.append(order.place)
         if verdicts & {Verdict.IMPOSSIBLE, Verdict.NO_DESCENT}:
             return SETTLED
@@ -200,14 +200,15 @@ class Coincidences:
                 moved = some if coincidence.fixed else rest
                 moves = (inserted.later, some), (inserted.earlier, moved)
                 judges = [partial(judge, coincidence, those, present) for judge, those in moves if at is sets]
-                later = (coincidence.later, _moved(at.zero, [c.later for c in some]))
-                earlier = (coincidence.earlier, _moved(at.zero, [c.earlier for c in moved]))
+                later, earlier = _moved(at.zero, [c.later for c in some]), _moved(at.zero, [c.earlier for c in moved])
+                later = _way(w, coincidence.later, later, coincidence.by_values_later, at)
+                earlier = _way(w, coincidence.earlier, earlier, coincidence.by_values_earlier, at)
                 before, after = (_Inserted.of(coincidence, side, happened) for side, happened in enumerate((some, rest)))
                 if coincidence.fixed:
-                    yield _Order(_possible(w, later), judges[:1], after)
-                    yield _Order(_possible(w, earlier), judges[1:], before)
+                    yield _Order(later, judges[:1], after)
+                    yield _Order(earlier, judges[1:], before)
                 else:
-                    yield _Order(_possible(w, later, earlier), judges, after)
+                    yield _Order(later + earlier, judges, after)
         for entered, changed in branches(self._c, w, sets, self._tolerances.biactive):
             judges = [partial(inserted.entered, entered), partial(inserted.at_end, changed)]
             yield _Order([] if entered is None else [entered], judges)
@@ -310,6 +311,11 @@ def _moved(zero, moves):
     return found
 
 
-def _possible(w, *ways):
-    """Without those for which there is no place."""
-    return [Entered(np.array([variable]), zero, w, NONE) for variable, zero in ways if variable is not None]
+def _way(w, variable, zero, by_values, sets):
+    """The branch in which a place has no extent, or none where there is no such place."""
+    if variable is None:
+        return []
+    # of the pairs that follow from values both sides are looked at where both are zero: a place that grows may have either
+    clear = ~(sets.gamma | sets.open)[by_values.sources]
+    zero[by_values.targets[clear]] = sets.zero[by_values.sources[clear]]
+    return [Entered(np.array([variable]), zero, w, by_values.targets)]

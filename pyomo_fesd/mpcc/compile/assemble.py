@@ -266,4 +266,5 @@ def _coincidence(hint, pairs, columns):
     )
     extents = hint.later, hint.earlier, hint.before, hint.after
     later, earlier, before, after = (None if v is None or id(v) not in columns else columns[id(v)][0] for v in extents)
-    return CoincidenceIndices(changes, later, earlier, hint.fixed, before, after)
+    by_values = (moves(some, pairs) for some in (hint.by_values_later, hint.by_values_earlier))
+    return CoincidenceIndices(changes, later, earlier, hint.fixed, before, after, *by_values)

@@ -64,6 +64,8 @@ class CoincidenceIndices:
     fixed: bool
     before: int | None = None
     after: int | None = None
+    by_values_later: MoveIndices | None = None
+    by_values_earlier: MoveIndices | None = None
 
 
 @dataclass(frozen=True, eq=False)
