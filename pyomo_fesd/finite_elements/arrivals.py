@@ -149,9 +149,16 @@ def _option(rows, modes, change, condition, end):
         gauges=(c,),
         requires=tuple(_weights(rows, modes, active, end)),
         sides=(*_weights(rows, modes, other, end), *held, *least, (rows.leaving[leaving.name, end.inner], SECOND_SIDE)),
-        # beyond its end a condition of the mode that was left may hold or not
-        either=tuple(_of_boundary(rows, leaving, end.boundary)) if end.step is TO_LAST else (),
+        either=tuple(_either(rows, leaving, end)),
     )
+
+
+def _either(rows, leaving, end):
+    """Pairs that follow from values at the boundaries that lie at the end: where no mode is left, a condition may hold or not."""
+    for component in (rows.parts, rows.region, rows.least):
+        for index, pair in component.items():
+            if index[1] in (end.boundary, end.inner, end.inner - end.step) and index[:2] != (leaving.name, end.inner):
+                yield pair
 
 
 def _weights(rows, modes, active, end):

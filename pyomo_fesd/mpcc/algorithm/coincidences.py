@@ -7,6 +7,7 @@ does not, the order is settled.  A point with any other order is not certified. 
 the end (``arrivals``).
 """
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -27,6 +28,8 @@ from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets, Stationarity, Verdic
 PATIENCE = 300
 #: A place nearer to its least extent than this may be none: NLP solvers leave it a little above its bound.
 NEAR_BOUND = 1e-4
+#: Places that come in at an end at a time.
+AT_END = 2
 #: Outcomes of an order: it leads to no better point; that could not be shown; or no branch on this grid contains the incumbent.
 SETTLED, OPEN, ABSENT = 'settled', 'open', 'absent'
 
@@ -35,17 +38,18 @@ SETTLED, OPEN, ABSENT = 'settled', 'open', 'absent'
 class _Order:
     """An order of changes: equivalent ways to it, and functions that return the ``Verdict`` of an inserted place.
 
-    ``place`` is what the inserted place holds; None at an end of a row.
+    ``place`` is what the inserted place holds; None for one of several changes at an end of a row.
     """
 
     ways: list
     judges: list
-    place: '_Inserted | None' = None
+    place: '_Inserted | _AtEnd | None' = None
 
     @property
     def key(self):
-        """Equal for orders with the same branches; empty without one."""
-        return tuple((way.extents.tobytes(), way.zero.tobytes()) for way in self.ways)
+        """Equal for orders with the same branches and the same place; None without a branch."""
+        ways = tuple((way.extents.tobytes(), way.zero.tobytes()) for way in self.ways)
+        return (self.place, ways) if ways else None
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,14 @@ class _Inserted:
         if self == other or self.coincidence is not other.coincidence or self.side > other.side:
             return False
         return self.happened <= other.happened
+
+
+@dataclass(frozen=True)
+class _AtEnd:
+    """What a place at an end of a row holds: the change of one system."""
+
+    row: int
+    system: int
 
 
 class Coincidences:
@@ -139,7 +151,7 @@ class Coincidences:
             return OPEN
         possible = []
         for order in self._orders(point, sets):
-            if order.key and order.key in tried:
+            if order.key is not None and order.key in tried:
                 continue
             tried.add(order.key)
             found = self._order(point, order, possible)
@@ -147,8 +159,7 @@ class Coincidences:
                 outcome = OPEN
             elif found is not SETTLED:
                 return found
-        # an order that takes two places more has none of them where one alone is inserted, and the other changes stay together
-        return OPEN if any(one.precedes(other) for one, other in permutations(possible, 2)) else outcome
+        return OPEN if _follow(possible) else outcome
 
     def _order(self, point, order, possible):
         """A better point in an order; or its outcome.  What it inserts is appended to ``possible`` if that is possible."""
@@ -209,9 +220,9 @@ class Coincidences:
                     yield _Order(earlier, judges[1:], before)
                 else:
                     yield _Order(later + earlier, judges, after)
-        for entered, changed in branches(self._c, w, sets, self._tolerances.biactive):
+        for entered, changed, alone in branches(self._c, w, sets, self._tolerances.biactive):
             judges = [partial(inserted.entered, entered), partial(inserted.at_end, changed)]
-            yield _Order([] if entered is None else [entered], judges)
+            yield _Order([] if entered is None else [entered], judges, None if alone is None else _AtEnd(*alone))
 
     def _situations(self, w, sets) -> Iterator[tuple]:
         """Each coincidence with the active sets; also those as if the place beside it, at its lower bound, were none."""
@@ -282,6 +293,18 @@ class Coincidences:
             if found is not None and found.f <= enough:
                 return found
         return OPEN
+
+
+def _follow(possible):
+    """Whether there may be an order that is not tried: with one more place than is inserted at a time.
+
+    The changes that come apart in it stay together where fewer places are inserted, which may leave no direction at all.  At an end
+    of a row two places come in at a time, else one.
+    """
+    at_ends = {place for place in possible if isinstance(place, _AtEnd)}
+    inner = [place for place in possible if isinstance(place, _Inserted)]
+    many = max(Counter(place.row for place in at_ends).values(), default=0) > AT_END
+    return many or any(one.precedes(other) for one, other in permutations(inner, 2))
 
 
 def _differs(change, sets):

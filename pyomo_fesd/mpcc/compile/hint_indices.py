@@ -54,7 +54,7 @@ class ChangeIndices:
     happening: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CoincidenceIndices:
     """A ``Coincidence`` by positions of pairs and variables (None: there is no such place)."""
 
