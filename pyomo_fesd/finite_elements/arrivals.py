@@ -73,14 +73,17 @@ def _families(moving):
 def _row(moving, places, end):
     """The elements of the control stage at an end, from there inwards."""
     stage = moving.grid.stages[end.element.stage]
-    inner, happening = stage[1:] if end.step is TO_FIRST else stage[-2::-1], pairs_of_events(moving)
+    inner, events = stage[1:] if end.step is TO_FIRST else stage[-2::-1], pairs_of_events(moving)
+    elements = moving.grid.elements
     found = [Place(moving.r[end.element.n])]
     for e in inner:
         inside, between = places.inwards(e, end.step)
         if len(found) == 1:
             # what happens at the boundary itself stays there
-            between = [(pair, None if pair.parent_component() in happening else source) for pair, source in between]
-        found.append(Place(moving.r[e.n], tuple(inside), tuple(between)))
+            between = [(pair, None if pair.parent_component() in events else source) for pair, source in between]
+        # the boundary of the element towards the end
+        happening = places.happening(e if end.step is TO_LAST else elements[e.n - 2])
+        found.append(Place(moving.r[e.n], tuple(inside), tuple(between), tuple(happening)))
     return tuple(found)
 
 

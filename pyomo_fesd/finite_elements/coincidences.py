@@ -28,7 +28,8 @@ def add_coincidences(moving: MovingGrid) -> None:
     names = _jumping_between_stages(moving)
     jumping = {family for name, family in families.items() if name in names}
     several = len(set(families.values())) > 1
-    for before, after in zip(moving.grid.elements, moving.grid.elements[1:]):
+    elements = moving.grid.elements
+    for n, (before, after) in enumerate(zip(elements, elements[1:])):
         ends, begins = moving.grid.stages[before.stage], moving.grid.stages[after.stage]
         later = None if begins[-1] is after else moving.r[after.n]
         earlier = None if ends[0] is before else moving.r[before.n]
@@ -37,8 +38,9 @@ def add_coincidences(moving: MovingGrid) -> None:
         if several or after.opens_stage:
             changes = tuple(_changes(places, before, families, left_out))
             beside = moving.r[before.n], moving.r[after.n]
+            beyond = (None if v is None else _all_changes(places, elements[k]) for v, k in ((later, n + 1), (earlier, n - 1)))
             by_values = (tuple(_by_values(moving, before.n, step)) for step in (1, -1))
-            found.append(Coincidence(changes, later, earlier, after.opens_stage, *beside, *by_values))
+            found.append(Coincidence(changes, later, earlier, after.opens_stage, *beside, *beyond, *by_values))
 
 
 def _jumping_between_stages(moving):
@@ -56,6 +58,11 @@ def _changes(places, before, families, left_out) -> Iterator[Change]:
         if family not in left_out:
             jumps = tuple(pair for pair, _ in happening[family])
             yield Change(tuple(compared[family]), tuple(later[family]), tuple(earlier[family]), jumps)
+
+
+def _all_changes(places, before):
+    """All that changes at the boundary after ``before``."""
+    return Change(tuple(places.compared(before)), (), (), tuple(places.happening(before)))
 
 
 def _by_values(moving, b, step) -> Iterator[tuple]:

@@ -33,6 +33,8 @@ class Entered:
         pairs of which any side may be zero
     between : bool
         whether one change has come in on both sides of an end between two rows
+    spares : bool
+        whether nothing else is lost where the variables vanish
     """
 
     extents: np.ndarray
@@ -40,6 +42,7 @@ class Entered:
     start: np.ndarray
     either: np.ndarray
     between: bool = False
+    spares: bool = True
 
 
 @dataclass(frozen=True)
@@ -191,7 +194,7 @@ def _moved_inwards(row, zero, start, undecided):
         for move in (place.inside, place.between):
             new[move.ended] = G_ZERO
             new[move.targets] = zero[move.sources]
-        if not _differ(place.inside, zero, undecided):
+        if not (_differ(place.inside, zero, undecided) or np.any(zero[place.happening] != G_ZERO)):
             at[place.extent] += start[place.extent]
             at[row[0].extent] = 0.0
             return new, at

@@ -212,8 +212,8 @@ class Coincidences:
                 moves = (inserted.later, some), (inserted.earlier, moved)
                 judges = [partial(judge, coincidence, those, present) for judge, those in moves if at is sets]
                 later, earlier = _moved(at.zero, [c.later for c in some]), _moved(at.zero, [c.earlier for c in moved])
-                later = _way(w, coincidence.later, later, coincidence.by_values_later, at)
-                earlier = _way(w, coincidence.earlier, earlier, coincidence.by_values_earlier, at)
+                later = _way(w, coincidence.later, later, coincidence.by_values_later, coincidence.beyond_later, at)
+                earlier = _way(w, coincidence.earlier, earlier, coincidence.by_values_earlier, coincidence.beyond_earlier, at)
                 before, after = (_Inserted.of(coincidence, side, happened) for side, happened in enumerate((some, rest)))
                 if coincidence.fixed:
                     yield _Order(later, judges[:1], after)
@@ -246,7 +246,7 @@ class Coincidences:
             if start in (ABSENT, OPEN):
                 return start
             if self._is_another(point, start):
-                return ABSENT
+                return OPEN
             gamma = np.zeros(len(way.zero), dtype=bool)
             gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
             sets = ActiveSets(self._subsolves.settled(start.w, way.zero), gamma)
@@ -267,9 +267,10 @@ class Coincidences:
         more['box'][0][way.extents] = 0.0
         first = self._subsolves.attempt(start, zero, None, 1.0, **more)
         if first is None or first.status in INFEASIBLE:
-            return ABSENT, None
+            # without a place to spare the branch lacks another change of the incumbent, which shows nothing about the order
+            return ABSENT if way.spares else OPEN, None
         if first.solved and self._c.evaluate(first.w).f > point.f + AS_GOOD * max(1.0, abs(point.f)):
-            return ABSENT, None
+            return OPEN, None
         apart = self._decides(point.w, way.extents)
         solved, equal = self._branches.solutions.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
         if first.solved and (solved is None or not solved.solved):
@@ -315,6 +316,12 @@ def _differs(change, sets):
     return bool(happening.any() or np.any((sets.zero[change.pairs] != sets.zero[change.partners]) & clear))
 
 
+def _is_alike(change, sets):
+    """Whether nothing changes for certain."""
+    undecided = sets.gamma | sets.open
+    return not (_differs(change, sets) or undecided[change.pairs].any() or undecided[change.partners].any())
+
+
 def _subsets(changes, fixed):
     """The changes that come apart from the rest: each one alone, all but one, and all if the place itself matters."""
     single = [[change] for change in changes]
@@ -334,11 +341,11 @@ def _moved(zero, moves):
     return found
 
 
-def _way(w, variable, zero, by_values, sets):
+def _way(w, variable, zero, by_values, beyond, sets):
     """The branch in which a place has no extent, or none where there is no such place."""
     if variable is None:
         return []
     # of the pairs that follow from values both sides are looked at where both are zero: a place that grows may have either
     clear = ~(sets.gamma | sets.open)[by_values.sources]
     zero[by_values.targets[clear]] = sets.zero[by_values.sources[clear]]
-    return [Entered(np.array([variable]), zero, w, by_values.targets)]
+    return [Entered(np.array([variable]), zero, w, by_values.targets, spares=_is_alike(beyond, sets))]

@@ -64,6 +64,8 @@ class CoincidenceIndices:
     fixed: bool
     before: int | None = None
     after: int | None = None
+    beyond_later: ChangeIndices | None = None
+    beyond_earlier: ChangeIndices | None = None
     by_values_later: MoveIndices | None = None
     by_values_earlier: MoveIndices | None = None
 
@@ -112,6 +114,7 @@ class PlaceIndices:
     extent: int | None
     inside: MoveIndices
     between: MoveIndices
+    happening: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
