@@ -47,6 +47,11 @@ class Coincidence:
         whether they also fall together with something that does not move, so that one change alone matters too
     before, after : VarData or None
         the extents of the places on both sides, whether changes can move past them or not
+    beyond_later, beyond_earlier : Change or None
+        all that changes on the other side of the place that gets the distance 0: without a change there this place is to spare
+    by_values_later, by_values_earlier : tuple of (ComplementarityData, ComplementarityData)
+        if changes come later, or earlier, the first pair has the values that the second one has in the solution, and its sides
+        follow from them: the zero side of the second one where only one side of that is zero, else any side
     """
 
     changes: tuple[Change, ...]
@@ -55,6 +60,10 @@ class Coincidence:
     fixed: bool = False
     before: VarData | None = None
     after: VarData | None = None
+    beyond_later: Change | None = None
+    beyond_earlier: Change | None = None
+    by_values_later: tuple[tuple[ComplementarityData, ComplementarityData], ...] = ()
+    by_values_earlier: tuple[tuple[ComplementarityData, ComplementarityData], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +76,14 @@ class Place:
     inside, between : tuple of (ComplementarityData, ComplementarityData or None)
         pairs of the place, and pairs of the boundary towards the end.  If everything moves inwards by one place, the first pair
         takes the zero side that the second one has; with None its first side becomes zero
+    happening : tuple of ComplementarityData
+        something happens at that boundary if the first side of one of them is not zero
     """
 
     extent: VarData
     inside: tuple[tuple[ComplementarityData, ComplementarityData | None], ...] = ()
     between: tuple[tuple[ComplementarityData, ComplementarityData | None], ...] = ()
+    happening: tuple[ComplementarityData, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

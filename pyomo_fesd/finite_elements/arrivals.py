@@ -16,11 +16,9 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pyomo.common.collections import ComponentSet
-
 from pyomo_fesd.core import Arrival, Element, MovingGrid, Option, Place, Toggle, homotopy_hints
 from pyomo_fesd.finite_elements.coincidences import switching_together
-from pyomo_fesd.finite_elements.neighbour_branches import PairsByPlace
+from pyomo_fesd.finite_elements.neighbour_branches import PairsByPlace, pairs_of_events
 
 #: Directions from the inside to the two ends.
 TO_FIRST, TO_LAST = -1, 1
@@ -75,21 +73,18 @@ def _families(moving):
 def _row(moving, places, end):
     """The elements of the control stage at an end, from there inwards."""
     stage = moving.grid.stages[end.element.stage]
-    inner, happening = stage[1:] if end.step is TO_FIRST else stage[-2::-1], _happening(moving)
+    inner, events = stage[1:] if end.step is TO_FIRST else stage[-2::-1], pairs_of_events(moving)
+    elements = moving.grid.elements
     found = [Place(moving.r[end.element.n])]
     for e in inner:
         inside, between = places.inwards(e, end.step)
         if len(found) == 1:
             # what happens at the boundary itself stays there
-            between = [(pair, None if pair.parent_component() in happening else source) for pair, source in between]
-        found.append(Place(moving.r[e.n], tuple(inside), tuple(between)))
+            between = [(pair, None if pair.parent_component() in events else source) for pair, source in between]
+        # the boundary of the element towards the end
+        happening = places.happening(e if end.step is TO_LAST else elements[e.n - 2])
+        found.append(Place(moving.r[e.n], tuple(inside), tuple(between), tuple(happening)))
     return tuple(found)
-
-
-def _happening(moving):
-    """Pairs whose first side is 0 at boundaries where nothing happens."""
-    hysteresis, jumps = moving.hysteresis, moving.state_jumps
-    return ComponentSet([*([hysteresis.leaving] if hysteresis else []), *([jumps.happens, jumps.binary] if jumps else [])])
 
 
 # conditions that elements sum up
@@ -157,9 +152,16 @@ def _option(rows, modes, change, condition, end):
         gauges=(c,),
         requires=tuple(_weights(rows, modes, active, end)),
         sides=(*_weights(rows, modes, other, end), *held, *least, (rows.leaving[leaving.name, end.inner], SECOND_SIDE)),
-        # beyond its end a condition of the mode that was left may hold or not
-        either=tuple(_of_boundary(rows, leaving, end.boundary)) if end.step is TO_LAST else (),
+        either=tuple(_either(rows, leaving, end)),
     )
+
+
+def _either(rows, leaving, end):
+    """Pairs that follow from values at the boundaries that lie at the end: where no mode is left, a condition may hold or not."""
+    for component in (rows.parts, rows.region, rows.least):
+        for index, pair in component.items():
+            if index[1] in (end.boundary, end.inner, end.inner - end.step) and index[:2] != (leaving.name, end.inner):
+                yield pair
 
 
 def _weights(rows, modes, active, end):

@@ -18,6 +18,7 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo_fesd.core import Change, Coincidence, MovingGrid, all_switched_systems, homotopy_hints
 from pyomo_fesd.finite_elements.algebraic_graph import rule_of
 from pyomo_fesd.finite_elements.continuity import inner_label
+from pyomo_fesd.finite_elements.hysteresis import LEFT, RIGHT
 from pyomo_fesd.finite_elements.neighbour_branches import PairsByPlace
 
 
@@ -27,7 +28,8 @@ def add_coincidences(moving: MovingGrid) -> None:
     names = _jumping_between_stages(moving)
     jumping = {family for name, family in families.items() if name in names}
     several = len(set(families.values())) > 1
-    for before, after in zip(moving.grid.elements, moving.grid.elements[1:]):
+    elements = moving.grid.elements
+    for n, (before, after) in enumerate(zip(elements, elements[1:])):
         ends, begins = moving.grid.stages[before.stage], moving.grid.stages[after.stage]
         later = None if begins[-1] is after else moving.r[after.n]
         earlier = None if ends[0] is before else moving.r[before.n]
@@ -36,7 +38,9 @@ def add_coincidences(moving: MovingGrid) -> None:
         if several or after.opens_stage:
             changes = tuple(_changes(places, before, families, left_out))
             beside = moving.r[before.n], moving.r[after.n]
-            found.append(Coincidence(changes, later, earlier, after.opens_stage, *beside))
+            beyond = (None if v is None else _all_changes(places, elements[k]) for v, k in ((later, n + 1), (earlier, n - 1)))
+            by_values = (tuple(_by_values(moving, before.n, step)) for step in (1, -1))
+            found.append(Coincidence(changes, later, earlier, after.opens_stage, *beside, *beyond, *by_values))
 
 
 def _jumping_between_stages(moving):
@@ -54,6 +58,40 @@ def _changes(places, before, families, left_out) -> Iterator[Change]:
         if family not in left_out:
             jumps = tuple(pair for pair, _ in happening[family])
             yield Change(tuple(compared[family]), tuple(later[family]), tuple(earlier[family]), jumps)
+
+
+def _all_changes(places, before):
+    """All that changes at the boundary after ``before``."""
+    return Change(tuple(places.compared(before)), (), (), tuple(places.happening(before)))
+
+
+def _by_values(moving, b, step) -> Iterator[tuple]:
+    """The conditions of modes with hysteresis beside an element of length zero, with those of the same values at boundary ``b``.
+
+    The element lies behind ``b`` if changes come later (``step`` 1), else before it.  A mode that is not active has any sign of its
+    condition, which no other boundary shows.
+    """
+    hysteresis, jumps = moving.hysteresis, moving.state_jumps is not None
+    for (name, _, k, side), pair in _at_boundary(hysteresis and hysteresis.parts, b):
+        right = (name, b, k, RIGHT) in hysteresis.parts
+        # right of b, and at the end of an element behind it, a state may not have jumped yet; so left of b with one before it
+        if side == (LEFT if step > 0 else RIGHT) or not (jumps and right):
+            yield pair, pair
+        other = name, b + step, k, side
+        if other in hysteresis.parts and (side == (RIGHT if step > 0 else LEFT) or not (jumps and right)):
+            # what follows a set-point that changes at b has the new one
+            follows = right and step > 0 and not jumps
+            yield hysteresis.parts[other], hysteresis.parts[name, b, k, RIGHT if follows else side]
+    for (name, _, k), pair in _at_boundary(hysteresis and hysteresis.least, b):
+        right = (name, b, k, RIGHT) in hysteresis.parts
+        if step < 0 or not (jumps and right):
+            yield pair, pair
+        if (name, b + step, k) in hysteresis.least and (step > 0 or not right):
+            yield hysteresis.least[name, b + step, k], pair
+
+
+def _at_boundary(component, b):
+    return [] if component is None else [(index, pair) for index, pair in component.items() if index[1] == b]
 
 
 def _by_family(pairs, families):

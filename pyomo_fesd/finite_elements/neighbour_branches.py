@@ -14,6 +14,8 @@ Does not apply: to a single element.
 from collections import defaultdict
 from collections.abc import Iterator
 
+from pyomo.common.collections import ComponentSet
+
 from pyomo_fesd.core import Element, MovingGrid, NeighbourBranch, homotopy_hints
 
 
@@ -50,6 +52,7 @@ class PairsByPlace:
     def __init__(self, moving: MovingGrid):
         self._of_elements = _by_number(moving.pairs_of_elements())
         self._of_boundaries = _by_number(moving.pairs_of_boundaries())
+        self._of_events = pairs_of_events(moving)
         self._of_jumps = _by_number(_pairs_of_jumps(moving.state_jumps))
 
     def moved(self, before: Element, step: int) -> list[tuple]:
@@ -61,10 +64,12 @@ class PairsByPlace:
             1 where they come one element later, -1 where they come earlier
         """
         changed = before.n + max(step, 0)
+        # nothing happens at the boundary any longer, though it may at the one whose conditions it takes over
+        between = _matching(self._of_boundaries, before.n, before.n - step)
         return [
             *_matching(self._of_elements, changed, changed - step),
             *_matching(self._of_boundaries, before.n + step, before.n),
-            *_matching(self._of_boundaries, before.n, before.n - step),
+            *((pair, None if pair.parent_component() in self._of_events else source) for pair, source in between),
         ]
 
     def inwards(self, element: Element, step: int) -> tuple[list[tuple], list[tuple]]:
@@ -86,6 +91,12 @@ class PairsByPlace:
     def happening(self, before: Element) -> list:
         """Return the pairs whose first side is not zero if states jump at the boundary after ``before``."""
         return [pair for pairs in self._of_jumps for pair in pairs[before.n].values()]
+
+
+def pairs_of_events(moving: MovingGrid) -> ComponentSet:
+    """Return the pairs whose first side is 0 at boundaries where no mode with hysteresis ends and no state jumps."""
+    hysteresis, jumps = moving.hysteresis, moving.state_jumps
+    return ComponentSet([*([hysteresis.leaving] if hysteresis else []), *([jumps.happens, jumps.binary] if jumps else [])])
 
 
 def _pairs_of_jumps(jumps):

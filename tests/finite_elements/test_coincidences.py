@@ -11,7 +11,7 @@ import pyomo_fesd
 from pyomo_fesd.core import all_hints, moving_grids
 from pyomo_fesd.finite_elements.coincidences import switching_together
 from tests.models import dcs
-from tests.problems import carried, kink_at_stage, two_experiments
+from tests.problems import carried, events_together, kink_at_stage, two_experiments
 from tests.problems.running import move, transform
 
 
@@ -178,3 +178,56 @@ def test_with_one_element_in_each_control_stage_the_verdict_says_so():
     results = pyo.SolverFactory('mpec_hybrid').solve(m)
     assert pyo.value(m.fuel) > kink_at_stage.best(4.0)[1] + 0.1
     assert results.solver.stationarity == 'not certified' and 'order' in results.solver.reason
+
+
+# Where nothing can be inserted
+
+KINDS = ['hysteresis', 'jump']
+#: Slopes nearer to 0 are not told from it.
+CLEAR = 0.02
+#: What coincides, and on how many elements.
+TOGETHER = {
+    'two': (lambda seed: events_together.Events.draw(seed, 2), (0, 2), 6),
+    'three': (lambda seed: events_together.Events.draw(seed, 3), (0, 2), 6),
+    'one at a stage': (lambda seed: events_together.Events.draw(seed, 1), (0, 1, 2), 6),
+    'two at a stage': (lambda seed: events_together.Events.draw(seed, 2), (0, 1, 2), 6),
+    'two, no element to spare': (lambda seed: events_together.Events.draw(seed, 3).with_last_after(), (0, 2), 3),
+    'two at the end': (lambda seed: events_together.Events.draw(seed, 2, 2.0), (0, 2), 6),
+    'three at the end': (lambda seed: events_together.Events.draw(seed, 3, 2.0), (0, 2), 6),
+}
+
+
+def certified_and_minima(case, kind, seeds):
+    """For each seed with clear slopes, whether the point is certified, and whether it is a minimum."""
+    draw, times, nfe = TOGETHER[case]
+    for seed in seeds:
+        events = draw(seed)
+        if min(map(abs, events.slopes)) > CLEAR:
+            m = events_together.simulated(events, kind, nfe, times)
+            assert pyo.value(m.cost) == pytest.approx(events.objective(1), abs=1e-6)
+            yield pyomo_fesd.certify(m).certified, min(events.slopes) > 0
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('case', TOGETHER)
+def test_events_at_one_time_are_not_certified_where_a_slope_descends(case, kind):
+    found = list(certified_and_minima(case, kind, range(12)))
+    assert any(not minimum for _, minimum in found)
+    assert all(minimum for certified, minimum in found if certified)
+
+
+@pytest.mark.parametrize('case, kind', [('two', 'hysteresis'), ('two', 'jump'), ('two at the end', 'hysteresis')])
+def test_two_events_are_certified_where_no_slope_descends(case, kind):
+    found = list(certified_and_minima(case, kind, [0, 1, 6, 13, 17, 27, 45]))
+    assert any(minimum for _, minimum in found)
+    assert all(certified == minimum for certified, minimum in found)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_two_equal_events_stay_certified(kind):
+    events = events_together.Events.draw(0, 2)
+    same = np.array([[1.0, 1.5, 1.5, 2.0]] * 2)
+    events = events_together.Events(same, np.array([1.0, 1.0]), np.zeros(2), events.w)
+    m = events_together.simulated(events, kind, 6)
+    m.cost.set_value(m.cost.expr + (m.theta - 1) ** 2 + sum(m.x[2, i] for i in m.i) * 1e-3)
+    assert pyomo_fesd.certify(m).certified

@@ -113,12 +113,14 @@ def test_a_ball_that_lies_on_the_table():
     assert pyomo_fesd.switches(m) == [] and m.q[1].value == pytest.approx(0, abs=1e-9)
 
 
-def test_a_bounce_within_an_element_is_not_swallowed():
+@pytest.mark.parametrize('nfe', [2, 3])
+def test_a_bounce_within_an_element_is_not_swallowed(nfe):
     # with K = 2, contact forces >= 0 could stop the ball between two boundaries on the table
-    m = move(contacts.ball(0.5, 0.5, 0.0, 2.0), 2, 2)
+    m = move(contacts.ball(0.5, 0.5, 0.0, 2.0), nfe, 2)
     m.low = pyo.Objective(expr=m.q[0.5])
     results = pyo.SolverFactory('mpec_hybrid').solve(m)
-    assert results.solver.stationarity == 'B'
+    # it starts on the table, and whether it could have rested there first takes an element to spare
+    assert results.solver.stationarity == ('B' if nfe > 2 else 'not certified')
     assert m.q[0.5].value == pytest.approx(0.05, abs=1e-7)
 
 

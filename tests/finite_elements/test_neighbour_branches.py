@@ -73,7 +73,8 @@ def test_with_hysteresis_the_law_of_switching_goes_along():
 def test_with_jumps_they_go_along():
     m = move(carried.build_with_jump(), 6, 2)
     found = pairs(branches(m)[3, 1])
-    assert (('change', 4), ('change', 3)) in found and (('change', 3), ('change', 2)) in found
+    # nothing happens any longer where they were, though it may one boundary before
+    assert (('change', 4), ('change', 3)) in found and (('change', 3), None) in found
     # at the ends of the horizon nothing happens
     assert (('change', 1), None) in pairs(branches(m)[1, 1])
 

@@ -33,6 +33,8 @@ class Entered:
         pairs of which any side may be zero
     between : bool
         whether one change has come in on both sides of an end between two rows
+    spares : bool
+        whether nothing else is lost where the variables vanish
     """
 
     extents: np.ndarray
@@ -40,6 +42,7 @@ class Entered:
     start: np.ndarray
     either: np.ndarray
     between: bool = False
+    spares: bool = True
 
 
 @dataclass(frozen=True)
@@ -74,10 +77,11 @@ class _Change:
         return _Change(*(np.concatenate(both) for both in zip(vars(self).values(), vars(other).values())))
 
 
-def branches(c, w, sets, tolerance) -> Iterator[tuple[Entered | None, ChangedEnd | None]]:
+def branches(c, w, sets, tolerance) -> Iterator[tuple[Entered | None, ChangedEnd | None, tuple | None]]:
     """Yield the branches of all changes at the ends of the point ``w``, in every order; None for one without a place to spare.
 
-    With each comes the place at the end alone, if one change has come in at an end of all rows.
+    With each comes the place at the end alone, if one change has come in at an end of all rows; and if only one system changes, the
+    number of its rows and its own number.
 
     Parameters
     ----------
@@ -96,20 +100,21 @@ def branches(c, w, sets, tolerance) -> Iterator[tuple[Entered | None, ChangedEnd
         if changes:
             by_row.setdefault(id(arrival.rows), (arrival.rows, []))[1].append(changes)
     for rows, present in by_row.values():
-        for sequence in _sequences(present):
-            yield _entered(rows, sequence, sets, w), _changed_end(rows, sequence, sets)
+        for sequence, system in _sequences(present):
+            alone = None if system is None else (id(rows), system)
+            yield _entered(rows, sequence, sets, w), _changed_end(rows, sequence, sets), alone
 
 
 def _sequences(present) -> Iterator[tuple]:
-    """Each change alone, those of all systems together, and those of two systems one after the other; of many systems without the
-    last."""
-    yield from ((change,) for changes in present for change in changes)
+    """Each change alone with the number of its system, then, with None, those of all systems together, and those of two systems one
+    after the other; of many systems without the last."""
+    yield from (((change,), system) for system, changes in enumerate(present) for change in changes)
     if len(present) > FEW:
-        yield from ((sum(some[1:], some[0]),) for some in zip(*present))
+        yield from (((sum(some[1:], some[0]),), None) for some in zip(*present))
     elif len(present) > 1:
-        yield from ((sum(some[1:], some[0]),) for some in product(*present))
+        yield from (((sum(some[1:], some[0]),), None) for some in product(*present))
         for first, second in permutations(present, 2):
-            yield from product(first, second)
+            yield from ((both, None) for both in product(first, second))
 
 
 def _toggled(arrival, sets, at_end) -> Iterator[_Change]:
@@ -189,7 +194,7 @@ def _moved_inwards(row, zero, start, undecided):
         for move in (place.inside, place.between):
             new[move.ended] = G_ZERO
             new[move.targets] = zero[move.sources]
-        if not _differ(place.inside, zero, undecided):
+        if not (_differ(place.inside, zero, undecided) or np.any(zero[place.happening] != G_ZERO)):
             at[place.extent] += start[place.extent]
             at[row[0].extent] = 0.0
             return new, at

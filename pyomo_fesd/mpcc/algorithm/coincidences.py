@@ -7,6 +7,7 @@ does not, the order is settled.  A point with any other order is not certified. 
 the end (``arrivals``).
 """
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,7 +15,7 @@ from itertools import permutations
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.arrivals import NONE, Entered, branches
+from pyomo_fesd.mpcc.algorithm.arrivals import Entered, branches
 from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND
 from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
 from pyomo_fesd.mpcc.algorithm.insertions import OrdersByInsertion
@@ -27,6 +28,8 @@ from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets, Stationarity, Verdic
 PATIENCE = 300
 #: A place nearer to its least extent than this may be none: NLP solvers leave it a little above its bound.
 NEAR_BOUND = 1e-4
+#: Places that come in at an end at a time.
+AT_END = 2
 #: Outcomes of an order: it leads to no better point; that could not be shown; or no branch on this grid contains the incumbent.
 SETTLED, OPEN, ABSENT = 'settled', 'open', 'absent'
 
@@ -35,17 +38,18 @@ SETTLED, OPEN, ABSENT = 'settled', 'open', 'absent'
 class _Order:
     """An order of changes: equivalent ways to it, and functions that return the ``Verdict`` of an inserted place.
 
-    ``place`` is what the inserted place holds; None at an end of a row.
+    ``place`` is what the inserted place holds; None for one of several changes at an end of a row.
     """
 
     ways: list
     judges: list
-    place: '_Inserted | None' = None
+    place: '_Inserted | _AtEnd | None' = None
 
     @property
     def key(self):
-        """Equal for orders with the same branches; empty without one."""
-        return tuple((way.extents.tobytes(), way.zero.tobytes()) for way in self.ways)
+        """Equal for orders with the same branches and the same place; None without a branch."""
+        ways = tuple((way.extents.tobytes(), way.zero.tobytes()) for way in self.ways)
+        return (self.place, ways) if ways else None
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,14 @@ class _Inserted:
         if self == other or self.coincidence is not other.coincidence or self.side > other.side:
             return False
         return self.happened <= other.happened
+
+
+@dataclass(frozen=True)
+class _AtEnd:
+    """What a place at an end of a row holds: the change of one system."""
+
+    row: int
+    system: int
 
 
 class Coincidences:
@@ -139,7 +151,7 @@ class Coincidences:
             return OPEN
         possible = []
         for order in self._orders(point, sets):
-            if order.key and order.key in tried:
+            if order.key is not None and order.key in tried:
                 continue
             tried.add(order.key)
             found = self._order(point, order, possible)
@@ -147,8 +159,7 @@ class Coincidences:
                 outcome = OPEN
             elif found is not SETTLED:
                 return found
-        # an order that takes two places more has none of them where one alone is inserted, and the other changes stay together
-        return OPEN if any(one.precedes(other) for one, other in permutations(possible, 2)) else outcome
+        return OPEN if _follow(possible) else outcome
 
     def _order(self, point, order, possible):
         """A better point in an order; or its outcome.  What it inserts is appended to ``possible`` if that is possible."""
@@ -157,7 +168,7 @@ class Coincidences:
             verdicts.add(judge())
             if verdicts & {Verdict.IMPOSSIBLE, Verdict.NO_DESCENT}:
                 break
-        if order.place is not None and not verdicts <= {Verdict.IMPOSSIBLE, Verdict.NONE}:
+        if order.place is not None and Verdict.IMPOSSIBLE not in verdicts:
             possible.append(order.place)
         if verdicts & {Verdict.IMPOSSIBLE, Verdict.NO_DESCENT}:
             return SETTLED
@@ -200,17 +211,18 @@ class Coincidences:
                 moved = some if coincidence.fixed else rest
                 moves = (inserted.later, some), (inserted.earlier, moved)
                 judges = [partial(judge, coincidence, those, present) for judge, those in moves if at is sets]
-                later = (coincidence.later, _moved(at.zero, [c.later for c in some]))
-                earlier = (coincidence.earlier, _moved(at.zero, [c.earlier for c in moved]))
+                later, earlier = _moved(at.zero, [c.later for c in some]), _moved(at.zero, [c.earlier for c in moved])
+                later = _way(w, coincidence.later, later, coincidence.by_values_later, coincidence.beyond_later, at)
+                earlier = _way(w, coincidence.earlier, earlier, coincidence.by_values_earlier, coincidence.beyond_earlier, at)
                 before, after = (_Inserted.of(coincidence, side, happened) for side, happened in enumerate((some, rest)))
                 if coincidence.fixed:
-                    yield _Order(_possible(w, later), judges[:1], after)
-                    yield _Order(_possible(w, earlier), judges[1:], before)
+                    yield _Order(later, judges[:1], after)
+                    yield _Order(earlier, judges[1:], before)
                 else:
-                    yield _Order(_possible(w, later, earlier), judges, after)
-        for entered, changed in branches(self._c, w, sets, self._tolerances.biactive):
+                    yield _Order(later + earlier, judges, after)
+        for entered, changed, alone in branches(self._c, w, sets, self._tolerances.biactive):
             judges = [partial(inserted.entered, entered), partial(inserted.at_end, changed)]
-            yield _Order([] if entered is None else [entered], judges)
+            yield _Order([] if entered is None else [entered], judges, None if alone is None else _AtEnd(*alone))
 
     def _situations(self, w, sets) -> Iterator[tuple]:
         """Each coincidence with the active sets; also those as if the place beside it, at its lower bound, were none."""
@@ -234,7 +246,7 @@ class Coincidences:
             if start in (ABSENT, OPEN):
                 return start
             if self._is_another(point, start):
-                return ABSENT
+                return OPEN
             gamma = np.zeros(len(way.zero), dtype=bool)
             gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
             sets = ActiveSets(self._subsolves.settled(start.w, way.zero), gamma)
@@ -255,9 +267,10 @@ class Coincidences:
         more['box'][0][way.extents] = 0.0
         first = self._subsolves.attempt(start, zero, None, 1.0, **more)
         if first is None or first.status in INFEASIBLE:
-            return ABSENT, None
+            # without a place to spare the branch lacks another change of the incumbent, which shows nothing about the order
+            return ABSENT if way.spares else OPEN, None
         if first.solved and self._c.evaluate(first.w).f > point.f + AS_GOOD * max(1.0, abs(point.f)):
-            return ABSENT, None
+            return OPEN, None
         apart = self._decides(point.w, way.extents)
         solved, equal = self._branches.solutions.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
         if first.solved and (solved is None or not solved.solved):
@@ -283,12 +296,30 @@ class Coincidences:
         return OPEN
 
 
+def _follow(possible):
+    """Whether there may be an order that is not tried: with one more place than is inserted at a time.
+
+    The changes that come apart in it stay together where fewer places are inserted, which may leave no direction at all.  At an end
+    of a row two places come in at a time, else one.
+    """
+    at_ends = {place for place in possible if isinstance(place, _AtEnd)}
+    inner = [place for place in possible if isinstance(place, _Inserted)]
+    many = max(Counter(place.row for place in at_ends).values(), default=0) > AT_END
+    return many or any(one.precedes(other) for one, other in permutations(inner, 2))
+
+
 def _differs(change, sets):
     """Whether a change is there; a bi-active or open pair lies on both sides of it already."""
     undecided = sets.gamma | sets.open
     clear = ~undecided[change.pairs] & ~undecided[change.partners]
     happening = (sets.zero[change.happening] != G_ZERO) & ~undecided[change.happening]
     return bool(happening.any() or np.any((sets.zero[change.pairs] != sets.zero[change.partners]) & clear))
+
+
+def _is_alike(change, sets):
+    """Whether nothing changes for certain."""
+    undecided = sets.gamma | sets.open
+    return not (_differs(change, sets) or undecided[change.pairs].any() or undecided[change.partners].any())
 
 
 def _subsets(changes, fixed):
@@ -310,6 +341,11 @@ def _moved(zero, moves):
     return found
 
 
-def _possible(w, *ways):
-    """Without those for which there is no place."""
-    return [Entered(np.array([variable]), zero, w, NONE) for variable, zero in ways if variable is not None]
+def _way(w, variable, zero, by_values, beyond, sets):
+    """The branch in which a place has no extent, or none where there is no such place."""
+    if variable is None:
+        return []
+    # of the pairs that follow from values both sides are looked at where both are zero: a place that grows may have either
+    clear = ~(sets.gamma | sets.open)[by_values.sources]
+    zero[by_values.targets[clear]] = sets.zero[by_values.sources[clear]]
+    return [Entered(np.array([variable]), zero, w, by_values.targets, spares=_is_alike(beyond, sets))]

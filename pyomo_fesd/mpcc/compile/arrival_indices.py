@@ -26,7 +26,7 @@ def arrival_indices(arrivals, pairs, columns) -> list[ArrivalIndices]:
 
 def _place(place, pairs, columns):
     extent = columns[id(place.extent)][0] if id(place.extent) in columns else None
-    return PlaceIndices(extent, moves(place.inside, pairs), moves(place.between, pairs))
+    return PlaceIndices(extent, moves(place.inside, pairs), moves(place.between, pairs), positions_of(place.happening, pairs))
 
 
 def _toggle(toggle, numbers, pairs):

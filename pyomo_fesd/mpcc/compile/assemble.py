@@ -255,15 +255,18 @@ def _neighbour(branch, pairs, columns, s_x):
 
 
 def _coincidence(hint, pairs, columns):
-    changes = tuple(
-        ChangeIndices(
-            *both_positions(change.differing, pairs),
-            moves(change.later, pairs),
-            moves(change.earlier, pairs),
-            positions_of(change.happening, pairs),
-        )
-        for change in hint.changes
-    )
+    changes = tuple(_change(change, pairs) for change in hint.changes)
     extents = hint.later, hint.earlier, hint.before, hint.after
     later, earlier, before, after = (None if v is None or id(v) not in columns else columns[id(v)][0] for v in extents)
-    return CoincidenceIndices(changes, later, earlier, hint.fixed, before, after)
+    beyond = (None if change is None else _change(change, pairs) for change in (hint.beyond_later, hint.beyond_earlier))
+    by_values = (moves(some, pairs) for some in (hint.by_values_later, hint.by_values_earlier))
+    return CoincidenceIndices(changes, later, earlier, hint.fixed, before, after, *beyond, *by_values)
+
+
+def _change(change, pairs):
+    return ChangeIndices(
+        *both_positions(change.differing, pairs),
+        moves(change.later, pairs),
+        moves(change.earlier, pairs),
+        positions_of(change.happening, pairs),
+    )

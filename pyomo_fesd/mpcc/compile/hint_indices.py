@@ -54,7 +54,7 @@ class ChangeIndices:
     happening: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CoincidenceIndices:
     """A ``Coincidence`` by positions of pairs and variables (None: there is no such place)."""
 
@@ -64,6 +64,10 @@ class CoincidenceIndices:
     fixed: bool
     before: int | None = None
     after: int | None = None
+    beyond_later: ChangeIndices | None = None
+    beyond_earlier: ChangeIndices | None = None
+    by_values_later: MoveIndices | None = None
+    by_values_earlier: MoveIndices | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +114,7 @@ class PlaceIndices:
     extent: int | None
     inside: MoveIndices
     between: MoveIndices
+    happening: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

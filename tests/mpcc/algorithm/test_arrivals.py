@@ -19,8 +19,8 @@ def moves(targets, sources):
 
 def row(number):
     """Places 0, 1, ... from the end inwards, each with the pairs 2n and 2n + 1 and the extent n."""
-    inner = (PlaceIndices(n, moves([2 * n, 2 * n + 1], [2 * n - 2, 2 * n - 1]), STILL) for n in range(1, number))
-    return (PlaceIndices(0, STILL, STILL), *inner)
+    inner = (PlaceIndices(n, moves([2 * n, 2 * n + 1], [2 * n - 2, 2 * n - 1]), STILL, NONE) for n in range(1, number))
+    return (PlaceIndices(0, STILL, STILL, NONE), *inner)
 
 
 def toggles(*gauges):
@@ -28,14 +28,14 @@ def toggles(*gauges):
 
 
 def both(arrivals, zero, gauges, extents):
-    """The branches, each with the changed end."""
+    """The branches, each with the changed end and the system that changes alone."""
     compiled = SimpleNamespace(arrivals=arrivals, measured=lambda w: np.array(gauges, dtype=float))
     zero = np.array(zero)
     return list(branches(compiled, np.array(extents, dtype=float), ActiveSets(zero, np.zeros(len(zero), dtype=bool)), 1e-6))
 
 
 def found(*given):
-    return [entered for entered, _ in both(*given)]
+    return [entered for entered, *_ in both(*given)]
 
 
 ONE_MODE = [G_ZERO, H_ZERO]
@@ -68,14 +68,23 @@ def test_without_a_place_to_spare_the_order_is_open():
 
 def test_the_place_at_the_end_alone_needs_no_place_to_spare():
     arrival = ArrivalIndices((row(2),), toggles(0, 1), ())
-    for (_, changed), mode in zip(both([arrival], [*ONE_MODE, *OTHER_MODE], [0, 0], [1, 1]), (BOTH, OTHER_MODE), strict=True):
+    for (_, changed, _), mode in zip(both([arrival], [*ONE_MODE, *OTHER_MODE], [0, 0], [1, 1]), (BOTH, OTHER_MODE), strict=True):
         assert (changed.extent, changed.inner) == (0, 1) and changed.zero.tolist() == [*mode, *OTHER_MODE]
         assert (changed.targets.tolist(), changed.sources.tolist()) == ([2, 3], [0, 1])
 
 
 def test_the_place_at_the_end_alone_is_none_between_two_rows():
     zero, arrival = ONE_MODE * 4, ArrivalIndices((row(2), row(2)), toggles(0, 1), ())
-    assert all(changed is None for _, changed in both([arrival], zero, [0, 0], [1, 1]))
+    assert all(changed is None for _, changed, _ in both([arrival], zero, [0, 0], [1, 1]))
+
+
+def test_an_event_between_equal_modes_is_no_place_to_spare():
+    happening = [OTHER_MODE[0]]  # the pair 4 between both places, its second side zero
+    end, inner = row(2)
+    inner = PlaceIndices(inner.extent, inner.inside, inner.between, np.array([4]))
+    arrival = [ArrivalIndices(((end, inner),), toggles(0, 1), ())]
+    assert found(arrival, ONE_MODE * 2 + happening, [0, 0], [1, 1]) == [None, None]
+    assert None not in found(arrival, [*ONE_MODE * 2, G_ZERO], [0, 0], [1, 1])
 
 
 def test_an_option_needs_its_mode_and_its_gauge():
@@ -88,10 +97,12 @@ def test_an_option_needs_its_mode_and_its_gauge():
 
 def test_two_systems_alone_together_and_in_both_orders():
     # the second system has the pair 6 at the end, 7 and 8 in the next places
-    rest = (PlaceIndices(n, moves([2 * n, 2 * n + 1, 6 + n], [2 * n - 2, 2 * n - 1, 5 + n]), STILL) for n in (1, 2))
+    rest = (PlaceIndices(n, moves([2 * n, 2 * n + 1, 6 + n], [2 * n - 2, 2 * n - 1, 5 + n]), STILL, NONE) for n in (1, 2))
     rows = ((row(1)[0], *rest),)
     systems = [ArrivalIndices(rows, (ToggleIndices(np.array([pair]), None, k, NONE, NONE),), ()) for k, pair in ((0, 0), (1, 6))]
     orders = found(systems, [G_ZERO] * 9, [0, 0], [1, 1, 1])
+    alone = [one for *_, one in both(systems, [G_ZERO] * 9, [0, 0], [1, 1, 1])]
+    assert alone[0] != alone[1] and None not in alone[:2] and not any(alone[2:])
     ends = [(entered.zero[[0, 2]].tolist(), entered.zero[[6, 7]].tolist(), entered.extents.tolist()) for entered in orders]
     on, off = [H_ZERO, G_ZERO], [G_ZERO, G_ZERO]
     assert ends[:3] == [(on, off, [0]), (off, on, [0]), (on, on, [0])]
@@ -101,7 +112,7 @@ def test_two_systems_alone_together_and_in_both_orders():
 
 
 def test_a_touched_end_between_two_rows_needs_a_place_on_both_sides():
-    right = PlaceIndices(2, STILL, STILL), PlaceIndices(3, moves([6, 7], [4, 5]), STILL)
+    right = PlaceIndices(2, STILL, STILL, NONE), PlaceIndices(3, moves([6, 7], [4, 5]), STILL, NONE)
     on_both = tuple(ToggleIndices(np.array([pair, pair + 4]), None, gauge, NONE, NONE) for pair, gauge in ((0, 0), (1, 1)))
     _, entered = found([ArrivalIndices((row(2), right), on_both, ())], ONE_MODE * 4, [0, 0], [1] * 4)
     assert entered.extents.tolist() == [0, 2] and entered.start.tolist() == [0, 2, 0, 2]
