@@ -99,10 +99,10 @@ def test_other_variables_refuse_to_leave_their_bounds():
 
 
 def test_another_mode_with_hysteresis_is_solved():
-    m, controller = prepared(relay=True)
+    m, controller = prepared(-2.2, relay=True, elements=4)
     (predicted,) = controller.interface.modes_at_first_time()
     (other,) = {'heating', 'cooling'} - {predicted}
-    answer = controller.step({m.x: -0.6, m.y: 1.0}, modes=[other])
+    answer = controller.step({m.x: -1.2, m.y: 1.0}, modes=[other])
     assert answer.certified and 'another mode with hysteresis' in answer.reason
     assert controller.interface.modes_at_first_time() == [other]
 
