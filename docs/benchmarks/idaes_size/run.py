@@ -107,10 +107,12 @@ def draw(table):
     """Seconds of each phase over the number of elements."""
     figure = Figure(figsize=(7, 4), layout='constrained')
     axis, smooth = figure.subplots(), table[table['variant'] == 'smooth, fixed grid, element by element']
-    table = table[table['variant'] == 'all calls']
+    without_grid, table = (table[table['variant'] == variant] for variant in ('simulate, no grid', 'all calls'))
     for phase in PHASES:
         axis.loglog(table['elements'], table[f'{phase} (s)'], 'o-', label='simulate' if phase == 'march' else phase)
     seconds = smooth[['march (s)', 'solve (s)']].sum(axis=1)
+    everything = without_grid[['build (s)', 'initialise (s)', 'march (s)']].sum(axis=1)
+    axis.loglog(without_grid['elements'], everything, 's:', color='C3', label='simulate without\na grid, everything')
     axis.loglog(smooth['elements'], seconds, 'k--', label='smooth, fixed grid:\nelement by element,\nand solve')
     stopped = smooth['solve (s)'].isna()
     axis.loglog(smooth['elements'][stopped], seconds[stopped], 'k^', label='stopped before its end')
