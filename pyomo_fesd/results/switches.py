@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from pyomo.common.dependencies import pandas as pd
@@ -77,7 +77,10 @@ def labelled_switches(model: Block, wrt: ContinuousSet) -> list[tuple[float, Swi
     found, index = elements(wrt), TimeIndex(wrt)
     times = physical_time(model, wrt)
     systems = (_systems(model, index) | complementarity_modes(model, wrt, index)).items()
-    changes = [(t, Switch(times[t], name, *both)) for name, modes in systems for t, *both in _changes(modes, found)]
+    changes = []
+    for name, modes in systems:
+        active = ((element.left, _active_mode(modes, element)) for element in found)
+        changes += [(label, Switch(times[label], name, *both)) for label, *both in _changes(active)]
     for _, label, name, after in jumps_that_happen(model, wrt):
         before = [(x, value(x)) for x, _ in after]
         changes.append((label, Switch(times[label], name, _state_values(before, index), _state_values(after, index))))
@@ -91,31 +94,25 @@ class ElementSwitches:
     ----------
     model : Block
     index : TimeIndex
-
-    Attributes
-    ----------
-    found : Switches
     """
 
     def __init__(self, model: Block, index: TimeIndex):
-        self._model, self._index, self._modes, self.found = model, index, {}, Switches()
+        self._model, self._index, self._active = model, index, {}
         self._systems = _systems(model, index)
         self._has_own = bool(complementarity_modes(model, index.wrt, index))
 
     def add(self, solved: list[tuple[Element, float, float]]) -> None:
-        """Add the switches at the left boundaries of ``solved`` elements, each given with the time there and its length."""
+        """Add ``solved`` elements, each with the time of its left boundary and its length."""
         # some of their expressions are numbers
         own = complementarity_modes(self._model, self._index.wrt, self._index) if self._has_own else {}
-        for element, left, _ in solved:
-            for name, modes in (self._systems | own).items():
-                self._add(name, _active_mode(modes, element), left)
+        for name, modes in (self._systems | own).items():
+            self._active.setdefault(name, []).extend((left, _active_mode(modes, element)) for element, left, _ in solved)
 
-    def _add(self, name, active, time):
-        before = self._modes.get(name)
-        if active is not None:
-            self._modes[name] = active
-            if before not in (None, active):
-                self.found.append(Switch(time, name, before, active))
+    @property
+    def found(self) -> Switches:
+        """The switches, at the times of left boundaries."""
+        changes = (Switch(time, name, *both) for name, active in self._active.items() for time, *both in _changes(active))
+        return Switches(sorted(changes, key=lambda switch: switch.time))
 
 
 def _systems(model, index):
@@ -123,15 +120,14 @@ def _systems(model, index):
     return disjunction_modes(model, index) | surface_sides(model, index)
 
 
-def _changes(modes, found: tuple[Element, ...]) -> Iterator[tuple]:
-    """``(label, mode before, mode after)`` of one system."""
+def _changes(active: Iterable[tuple]) -> Iterator[tuple]:
+    """``(place, mode before, mode after)`` of one system, from the place where each element begins and its active mode."""
     before = None
-    for element in found:
-        active = _active_mode(modes, element)
-        if active is not None:
-            if before is not None and active != before:
-                yield element.left, before, active
-            before = active
+    for place, mode in active:
+        if mode is not None:
+            if before is not None and mode != before:
+                yield place, before, mode
+            before = mode
 
 
 def _active_mode(modes, element):

@@ -122,16 +122,21 @@ class MarchingElements:
         """Solve one element after the other; returns the place of the last one."""
         rest, warm, solved, known = interval.end - interval.begin, False, [], 0
         waiting, moves = list(interval.places), self._pairs(interval.places[0], interval.places[-1])
-        while rest > NO_STEP * interval.h:
-            if not waiting:
+        try:
+            while rest > NO_STEP * interval.h:
+                if not waiting:
+                    self._take_down(solved, known)
+                    solved, waiting, known = [self._start_again(interval, moves, solved[-1])], interval.places[1:], 1
+                place, aim, left = waiting.pop(0), interval.aim(rest), interval.end - rest
+                found = self._solver.solve(place, aim, warm)
+                solved.append((place, left, found.length))
+                rest -= found.length
+                self._progress.time = interval.end - rest
+                warm = self._goes_on(found, aim, interval)
+        except FesdError:
+            if len(solved) > known:
                 self._take_down(solved, known)
-                solved, waiting, known = [self._start_again(interval, moves, solved[-1])], interval.places[1:], 1
-            place, aim, left = waiting.pop(0), interval.aim(rest), interval.end - rest
-            found = self._solver.solve(place, aim, warm)
-            solved.append((place, left, found.length))
-            rest -= found.length
-            self._progress.time = interval.end - rest
-            warm = self._goes_on(found, aim, interval)
+            raise
         self._take_down(solved, known)
         return place
 

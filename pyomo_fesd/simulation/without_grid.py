@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 from pyomo.common.collections import ComponentSet
 from pyomo.common.dependencies import pandas as pd
-from pyomo.core import Block, TransformationFactory, Var, value
+from pyomo.core import Block, TransformationFactory, Var
 from pyomo.dae import ContinuousSet, DerivativeVar, Integral
 from pyomo.gdp import Disjunct
 
@@ -91,15 +91,17 @@ class WithoutGrid:
     def _marched(self, known, march):
         """The trajectory of elements that march; None if they differ."""
         with restored(self._model, self._wrt):
-            # the whole grid says the same again
             with withheld_messages(logger.name) as messages:
                 self._lay_few()
             try:
                 run = march(self._numbers)
             except ElementsDiffer:
+                # the whole grid says the same again
+                messages.clear()
                 return None
-            for message in messages:
-                logger.handle(message)
+            finally:
+                for message in messages:
+                    logger.handle(message)
             found = run()
             known.read()
             return found
@@ -131,23 +133,18 @@ class WithoutGrid:
 
 
 class _Values:
-    """Values of the variables and indicators that a model has before elements are laid."""
+    """Values of the variables that a model has before elements are laid; those of indicators set the Booleans."""
 
     def __init__(self, root):
         places = Block, Disjunct
         self._variables = [v for ctype in (Var, DerivativeVar) for v in own_data(root, ctype, places) if not v.fixed]
-        self._root, self._numbers, self._weights = root, [], []
+        self._numbers = []
 
     def read(self):
         """Read what the simulation has found."""
         self._numbers = [(v, v.value) for v in self._variables]
-        multipliers = all_switched_systems(self._root).multipliers
-        self._weights = [(disjunct, value(weight, exception=False)) for disjunct, weight in multipliers.items()]
 
     def write(self):
         """Write it to the model as it was before."""
         for v, number in self._numbers:
             v.set_value(number, skip_validation=True)
-        for disjunct, weight in self._weights:
-            # Pyomo's own link: near 0 or 1 it sets the Boolean, between it leaves it unset
-            disjunct.binary_indicator_var.set_value(weight, skip_validation=True)

@@ -398,7 +398,7 @@ def test_a_solution_that_ends():
     with pytest.raises(FesdError, match=r'their limit is about 0\.997') as error:  # steps shrink
         pyomo_fesd.simulate(m, nfe=40)
     assert seen(m) == before
-    assert 0.5 < error.value.trajectory.index[-1] < 1.05
+    assert error.value.trajectory.index[-1] > 0.997  # all elements that were solved
 
 
 def test_a_time_limit():

@@ -1,0 +1,171 @@
+"""Orders of coinciding changes: which there are at a point, with the branches and the inserted places that show where they lead.
+
+Each change comes apart from the others alone, or stays behind alone; at a boundary that does not move all together matter too.
+
+Takes: the coincidences of a compiled MPCC, a point, and its active sets.
+Leaves: the orders.
+Does not apply: to orders that take more places than one, or two at an end (``follow_one_another`` tells where there may be some).
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import permutations
+
+import numpy as np
+
+from pyomo_fesd.mpcc.algorithm.arrivals import Entered, branches
+from pyomo_fesd.mpcc.algorithm.insertions import OrdersByInsertion
+from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets
+
+#: A place nearer to its least extent than this may be none: NLP solvers leave it a little above its bound.
+NEAR_BOUND = 1e-4
+#: Places that come in at an end at a time.
+AT_END = 2
+
+
+@dataclass(frozen=True)
+class Inserted:
+    """What a place inserted at a coincidence holds.
+
+    ``happened`` are the numbers of the changes that have happened there, and ``side`` is 0 before a boundary that stays where it
+    is, 1 behind it or where there is none.
+    """
+
+    coincidence: object
+    side: int
+    happened: frozenset
+
+    @classmethod
+    def of(cls, coincidence, side, changes):
+        """The place in which ``changes`` have happened."""
+        return cls(coincidence, side, frozenset(map(coincidence.changes.index, changes)))
+
+    def precedes(self, other):
+        """Whether the other can follow it: one more place of the same coincidence, with no change undone."""
+        if self == other or self.coincidence is not other.coincidence or self.side > other.side:
+            return False
+        return self.happened <= other.happened
+
+
+@dataclass(frozen=True)
+class AtEnd:
+    """What a place at an end of a row holds: the change of one system."""
+
+    row: int
+    system: int
+
+
+@dataclass(frozen=True)
+class Order:
+    """An order of changes: equivalent ways to it, and functions that return the ``Verdict`` of an inserted place.
+
+    ``place`` is what the inserted place holds; None for one of several changes at an end of a row.
+    """
+
+    ways: list
+    judges: list
+    place: Inserted | AtEnd | None = None
+
+    @property
+    def key(self):
+        """Equal for orders with the same branches and the same place; None without a branch."""
+        ways = tuple((way.extents.tobytes(), way.zero.tobytes()) for way in self.ways)
+        return (self.place, ways) if ways else None
+
+
+class Orders:
+    """The orders of one run; parameters as ``Coincidences``."""
+
+    def __init__(self, subsolves):
+        self._subsolves, self._c, self._tolerances = subsolves, subsolves.compiled, subsolves.tolerances
+
+    def at(self, point, sets) -> Iterator[Order]:
+        """Yield the orders of the changes that fall together at a point."""
+        w, inserted = point.w, OrdersByInsertion(self._subsolves, point, sets)
+        for coincidence, at in self._situations(w, sets):
+            present = [change for change in coincidence.changes if _differs(change, at)]
+            for some in _subsets(present, coincidence.fixed):
+                rest = [change for change in present if change not in some]
+                moved = some if coincidence.fixed else rest
+                moves = (inserted.later, some), (inserted.earlier, moved)
+                judges = [partial(judge, coincidence, those, present) for judge, those in moves if at is sets]
+                later, earlier = _moved(at.zero, [c.later for c in some]), _moved(at.zero, [c.earlier for c in moved])
+                later = _way(w, coincidence.later, later, coincidence.by_values_later, coincidence.beyond_later, at)
+                earlier = _way(w, coincidence.earlier, earlier, coincidence.by_values_earlier, coincidence.beyond_earlier, at)
+                before, after = (Inserted.of(coincidence, side, happened) for side, happened in enumerate((some, rest)))
+                if coincidence.fixed:
+                    yield Order(later, judges[:1], after)
+                    yield Order(earlier, judges[1:], before)
+                else:
+                    yield Order(later + earlier, judges, after)
+        for entered, changed, alone in branches(self._c, w, sets, self._tolerances.biactive):
+            judges = [partial(inserted.entered, entered), partial(inserted.at_end, changed)]
+            yield Order([] if entered is None else [entered], judges, None if alone is None else AtEnd(*alone))
+
+    def _situations(self, w, sets) -> Iterator[tuple]:
+        """Each coincidence with the active sets; also those as if the place beside it, at its lower bound, were none."""
+        by_later, by_earlier = ({getattr(c, side): c for c in self._c.coincidences} for side in ('later', 'earlier'))
+        for coincidence in self._c.coincidences:
+            yield coincidence, sets
+            beside = ((coincidence.later, by_earlier, 'earlier'), (coincidence.earlier, by_later, 'later'))
+            for variable, others, direction in beside:
+                if variable in others and variable is not None and w[variable] <= self._c.lbx[variable] + NEAR_BOUND:
+                    zero = _moved(sets.zero, [getattr(change, direction) for change in others[variable].changes])
+                    yield coincidence, ActiveSets(zero, np.zeros(len(zero), dtype=bool))
+
+
+def follow_one_another(possible):
+    """Whether there may be an order that is not tried: with one more place than is inserted at a time.
+
+    The changes that come apart in it stay together where fewer places are inserted, which may leave no direction at all.  At an end
+    of a row two places come in at a time, else one.
+    """
+    at_ends = {place for place in possible if isinstance(place, AtEnd)}
+    inner = [place for place in possible if isinstance(place, Inserted)]
+    many = max(Counter(place.row for place in at_ends).values(), default=0) > AT_END
+    return many or any(one.precedes(other) for one, other in permutations(inner, 2))
+
+
+def _differs(change, sets):
+    """Whether a change is there; a bi-active or open pair lies on both sides of it already."""
+    undecided = sets.gamma | sets.open
+    clear = ~undecided[change.pairs] & ~undecided[change.partners]
+    happening = (sets.zero[change.happening] != G_ZERO) & ~undecided[change.happening]
+    return bool(happening.any() or np.any((sets.zero[change.pairs] != sets.zero[change.partners]) & clear))
+
+
+def _is_alike(change, sets):
+    """Whether nothing changes for certain."""
+    undecided = sets.gamma | sets.open
+    return not (_differs(change, sets) or undecided[change.pairs].any() or undecided[change.partners].any())
+
+
+def _subsets(changes, fixed):
+    """The changes that come apart from the rest: each one alone, all but one, and all if the place itself matters."""
+    single = [[change] for change in changes]
+    if len(changes) > 2:
+        single += [[change for change in changes if change is not left_out] for left_out in changes]
+    if fixed:
+        return single + ([changes] if len(changes) > 1 else [])
+    return single if len(changes) > 1 else []
+
+
+def _moved(zero, moves):
+    """The zero sides after some changes have moved."""
+    found = zero.copy()
+    for move in moves:
+        found[move.ended] = G_ZERO
+        found[move.targets] = zero[move.sources]
+    return found
+
+
+def _way(w, variable, zero, by_values, beyond, sets):
+    """The branch in which a place has no extent, or none where there is no such place."""
+    if variable is None:
+        return []
+    # of the pairs that follow from values both sides are looked at where both are zero: a place that grows may have either
+    clear = ~(sets.gamma | sets.open)[by_values.sources]
+    zero[by_values.targets[clear]] = sets.zero[by_values.sources[clear]]
+    return [Entered(np.array([variable]), zero, w, by_values.targets, spares=_is_alike(beyond, sets))]
