@@ -112,15 +112,10 @@ def test_certify_looks_at_the_orders_too():
     assert pyomo_fesd.certify(m).certified
 
 
+@pytest.mark.parametrize('number', [2, 3])
 @pytest.mark.parametrize('common', [lambda theta: theta, lambda theta: theta * (theta + 1) / 2])
-def test_two_equal_systems_stay_together_and_are_certified(common):
-    assert solved(equal_systems(common, 2), warm_start=True)[1] == 'B'
-
-
-def test_more_equal_systems_are_not_certified_as_two_places_are_not_inserted_at_once():
-    # the point is a minimum: this is a limit
-    results = pyo.SolverFactory('mpec_hybrid').solve(equal_systems(lambda theta: theta, 3), warm_start=True)
-    assert results.solver.stationarity == 'not certified' and 'order' in results.solver.reason
+def test_equal_systems_stay_together_and_are_certified(common, number):
+    assert solved(equal_systems(common, number), warm_start=True)[1] == 'B'
 
 
 def equal_systems(common, number):
@@ -180,9 +175,9 @@ def test_with_one_element_in_each_control_stage_the_verdict_says_so():
     assert results.solver.stationarity == 'not certified' and 'order' in results.solver.reason
 
 
-# Where nothing can be inserted
+# Events at one time; nothing can be inserted with hysteresis and jumps
 
-KINDS = ['hysteresis', 'jump']
+KINDS = ['relay', 'hysteresis', 'jump']
 #: Slopes nearer to 0 are not told from it.
 CLEAR = 0.02
 #: What coincides, and on how many elements.
@@ -194,6 +189,7 @@ TOGETHER = {
     'two, no element to spare': (lambda seed: events_together.Events.draw(seed, 3).with_last_after(), (0, 2), 3),
     'two at the end': (lambda seed: events_together.Events.draw(seed, 2, 2.0), (0, 2), 6),
     'three at the end': (lambda seed: events_together.Events.draw(seed, 3, 2.0), (0, 2), 6),
+    'three, no element to spare': (lambda seed: events_together.Events.draw(seed, 4).with_last_after(), (0, 2), 3),
 }
 
 
@@ -216,8 +212,12 @@ def test_events_at_one_time_are_not_certified_where_a_slope_descends(case, kind)
     assert all(minimum for certified, minimum in found if certified)
 
 
-@pytest.mark.parametrize('case, kind', [('two', 'hysteresis'), ('two', 'jump'), ('two at the end', 'hysteresis')])
-def test_two_events_are_certified_where_no_slope_descends(case, kind):
+CERTIFIED = [(case, 'relay') for case in TOGETHER if case != 'one at a stage' and not case.endswith('end')]
+CERTIFIED += [('two', 'hysteresis'), ('two', 'jump'), ('two at the end', 'hysteresis')]
+
+
+@pytest.mark.parametrize('case, kind', CERTIFIED)
+def test_events_are_certified_where_no_slope_descends(case, kind):
     found = list(certified_and_minima(case, kind, [0, 1, 6, 13, 17, 27, 45]))
     assert any(minimum for _, minimum in found)
     assert all(certified == minimum for certified, minimum in found)

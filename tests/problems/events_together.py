@@ -1,4 +1,4 @@
-"""Relays with hysteresis, or state jumps, whose rates depend on each other, with events that coincide at theta = 1.
+"""Relays, with or without hysteresis, or state jumps, whose rates depend on each other, with events that coincide at theta = 1.
 
     x_i' = r_i(s) > 0,   x(0) = 0,   s_i = 1 from x_i = p_i + q_i theta on,   min w x(2) over theta
 
@@ -6,6 +6,7 @@ r_i(s) is one number for each set of events that have happened.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pyomo.dae as dae
@@ -62,7 +63,7 @@ class Events:
 
 
 def simulated(events, kind, nfe, times=(0, END)):
-    """The model on a moving grid, simulated for theta = 1; ``kind`` is 'hysteresis' or 'jump'."""
+    """The model on a moving grid, simulated for theta = 1; ``kind`` is 'relay', 'hysteresis' or 'jump'."""
     m = pyo.ConcreteModel()
     m.t, m.i = dae.ContinuousSet(initialize=times), pyo.RangeSet(len(events.p))
     m.theta = pyo.Var(initialize=1, bounds=(0.5, 1.5))
@@ -72,7 +73,10 @@ def simulated(events, kind, nfe, times=(0, END)):
     m.level = pyo.Expression(m.i, rule=lambda m, i: events.p[i - 1] + events.q[i - 1] * m.theta)
     m.rate = pyo.Constraint(m.t, m.i, rule=lambda m, t, i: m.dx[t, i] == _interpolated(events.r[i - 1], [m.s[t, j] for j in m.i]))
     m.cost = pyo.Objective(expr=sum(events.w[i - 1] * m.x[END, i] for i in m.i))
-    if kind == 'hysteresis':
+    if kind == 'relay':
+        m.law = Disjunction(m.t, m.i, rule=partial(_relay, overlap=0.0))
+        pyo.TransformationFactory('fesd.dcs').apply_to(m)
+    elif kind == 'hysteresis':
         m.law = Disjunction(m.t, m.i, rule=_relay)
         for i in m.i:
             m.law[0, i].disjuncts[0].indicator_var.fix(True)
@@ -92,8 +96,8 @@ def simulated(events, kind, nfe, times=(0, END)):
     return m
 
 
-def _relay(m, t, i):
-    return [[m.x[t, i] <= m.level[i], m.s[t, i] == 0], [m.x[t, i] >= m.level[i] - OVERLAP, m.s[t, i] == 1]]
+def _relay(m, t, i, overlap=OVERLAP):
+    return [[m.x[t, i] <= m.level[i], m.s[t, i] == 0], [m.x[t, i] >= m.level[i] - overlap, m.s[t, i] == 1]]
 
 
 def _interpolated(values, s):

@@ -40,6 +40,9 @@ class BranchSolutions:
             if f < self._c.evaluate(self._c.x0).f:
                 raise Stop(Outcome.UNBOUNDED)
             return None
+        if _is_clearly_above(f, below):
+            # its LPEC may take longer than all NLPs, and its answer would not matter
+            return None
         certificate = self._subsolves.certify(solved, equal)
         return Point(solved, f, certificate, equal) if certificate.feasible else None
 
@@ -48,7 +51,7 @@ class BranchSolutions:
         first = self._subsolves.attempt(w, zero, None, 1.0, duals=duals, **more)
         if first is not None and not self._subsolves.usable(first):
             return self._decided_at_once(w, zero, first, **more)
-        if first is not None and first.solved and self._c.evaluate(first.w).f > below + AS_GOOD * max(1.0, abs(below)):
+        if first is not None and first.solved and _is_clearly_above(self._c.evaluate(first.w).f, below):
             return None, None
         return self.decided(first, zero, **more)
 
@@ -88,3 +91,7 @@ class BranchSolutions:
             equal = equal & ~self._c.tentative
             solved = solve(w, zero, equal, 0.0, **more)
         return solved, equal
+
+
+def _is_clearly_above(f, below):
+    return f > below + AS_GOOD * max(1.0, abs(below))

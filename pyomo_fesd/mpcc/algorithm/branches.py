@@ -237,13 +237,13 @@ class Branches:
             return None
         # with an objective of 0 any other point would be as good
         enough = point.f - MATTERS * max(abs(point.f), -step.value)
-        found = (self.solutions.certified(w, step.zero, max_iter=SECOND) for w in (point.w + step.d, point.w))
+        found = (self.solutions.certified(w, step.zero, max_iter=SECOND, below=point.f) for w in (point.w + step.d, point.w))
         return next((better for better in found if is_below(better, enough)), None)
 
     def _step_down(self, point, enough):
         """In the branch of the certificate's direction: from its end, or within ever smaller trust regions."""
         step, w = point.certificate.lpec, point.w
-        better = self._point(w + step.d, step.zero, None, False)
+        better = self._point(w + step.d, step.zero, None, False, below=point.f)
         radius = self._tolerances.radius
         sets = self._subsolves.sets(w, self._tolerances.biactive)
         for _ in range(SHRINKS):
@@ -254,7 +254,8 @@ class Branches:
             if not step.solved or step.descent == 0.0:
                 return None
             reach = radius * np.maximum(1.0, np.abs(w))
-            better = self.solutions.certified(w + step.d, step.zero, box=(w - reach, w + reach), max_iter=self._first)
+            within = {'box': (w - reach, w + reach), 'max_iter': self._first}
+            better = self.solutions.certified(w + step.d, step.zero, below=point.f, **within)
         return better if is_below(better, enough) or _settles(better, point) else None
 
     def _beyond(self, point, enough, tolerance, clear, limits=None):
@@ -265,7 +266,7 @@ class Branches:
         step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal, limits=limits)
         if not step.solved or step.descent <= clear:
             return None
-        better = self._point(point.w + step.d, step.zero, None, False)
+        better = self._point(point.w + step.d, step.zero, None, False, below=point.f)
         return better if is_below(better, enough) else None
 
     def _point(self, w, zero, duals, final, **more):

@@ -1,10 +1,10 @@
 """Coinciding changes: every order of them is tried before a point counts as certified.
 
 In the incumbent the branches of all orders meet, but none of them is beside it for the LPEC: the place between two changes has no
-extent there.  One is inserted (``insertions``).  Where that does not settle an order, the incumbent is solved once more with a
-spare place, of extent zero.  If the linearised problem of that branch descends, the place grows and leads to a better point; if it
-does not, the order is settled.  A point with any other order is not certified.  Changes at an end of a row of places coincide with
-the end (``arrivals``).
+extent there.  One is inserted (``insertions``), or several where they can follow one another.  Where one alone does not settle an
+order, the incumbent is solved once more with a spare place, of extent zero.  If the linearised problem of that branch descends, the
+place grows and leads to a better point; if it does not, the order is settled.  A point with any other order is not certified.
+Changes at an end of a row of places coincide with the end (``arrivals``).
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND
 from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
-from pyomo_fesd.mpcc.algorithm.orders import NEAR_BOUND, Orders, follow_one_another
+from pyomo_fesd.mpcc.algorithm.orders import NEAR_BOUND, Orders, has_more_at_end, rows
 from pyomo_fesd.mpcc.algorithm.state import Point
 from pyomo_fesd.mpcc.algorithm.subsolves import INFEASIBLE
 from pyomo_fesd.mpcc.nlp import NlpResult
@@ -24,6 +24,8 @@ from pyomo_fesd.mpcc.subproblems import ActiveSets, Stationarity, Verdict
 PATIENCE = 300
 #: Outcomes of an order: it leads to no better point; that could not be shown; or no branch on this grid contains the incumbent.
 SETTLED, OPEN, ABSENT = 'settled', 'open', 'absent'
+#: Verdicts that settle an order.
+SETTLING = {Verdict.IMPOSSIBLE, Verdict.NO_DESCENT}
 
 
 class Coincidences:
@@ -102,18 +104,25 @@ class Coincidences:
                 outcome = OPEN
             elif found is not SETTLED:
                 return found
-        return OPEN if follow_one_another(possible) else outcome
+        return self._of_rows(point, sets, possible) if outcome is SETTLED else outcome
+
+    def _of_rows(self, point, sets, possible):
+        """Whether all orders with several places are settled, of which each one is ``possible`` alone."""
+        if has_more_at_end(possible):
+            return OPEN
+        verdicts = (self._orders.judged(point, sets, row) for row in rows(possible))
+        return SETTLED if all(verdict in SETTLING for verdict in verdicts) else OPEN
 
     def _order(self, point, order, possible):
         """A better point in an order; or its outcome.  What it inserts is appended to ``possible`` if that is possible."""
         verdicts = set()
         for judge in order.judges:
             verdicts.add(judge())
-            if verdicts & {Verdict.IMPOSSIBLE, Verdict.NO_DESCENT}:
+            if verdicts & SETTLING:
                 break
         if order.place is not None and Verdict.IMPOSSIBLE not in verdicts:
             possible.append(order.place)
-        if verdicts & {Verdict.IMPOSSIBLE, Verdict.NO_DESCENT}:
+        if verdicts & SETTLING:
             return SETTLED
         inserts = bool(verdicts - {Verdict.NONE})
         found = self._first(partial(self._try, point, inserts), order.ways)
@@ -200,7 +209,7 @@ class Coincidences:
         """A point in the branch that is better than the incumbent; or OPEN."""
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for start in (w + d, w):
-            found = self._branches.solutions.certified(start, zero, max_iter=SECOND)
+            found = self._branches.solutions.certified(start, zero, max_iter=SECOND, below=point.f)
             if found is not None and found.f <= enough:
                 return found
         return OPEN

@@ -1,7 +1,8 @@
-"""Orders of coinciding changes as insertions: which sides a copy of a part has between the changes (theory, section 4, orders).
+"""Orders of coinciding changes as insertions: which sides copies of parts have between the changes (theory, section 4, orders).
 
-Some changes come one place later: the copy lies before the place after them, with the sides of the place before.  Or they come
-earlier: it lies after the place before them, with the sides of the place after.  The other changes stay.
+In each copy some of the changes have happened.  It is a copy of the part after the boundary, in which those that have not
+happened yet have the sides of the place before; or of the part before it, in which those that have happened have the sides of the
+place after.
 
 Takes: coincidences, and the parts of the model.
 Leaves: the ``Verdict`` of each order.
@@ -14,6 +15,8 @@ from pyomo_fesd.mpcc.subproblems import G_ZERO, EndInsertion, Insertion, Verdict
 
 #: Whether a copy lies before the part beside an end between two rows: that on the near side of it, and that on the far side.
 SIDES = False, True
+#: The side of the boundary on which a copy lies.
+BEFORE, AFTER = 0, 1
 
 
 class OrdersByInsertion:
@@ -31,13 +34,21 @@ class OrdersByInsertion:
         self._subsolves, self._parts = subsolves, subsolves.parts
         self._point, self._sets = point, sets
 
-    def later(self, coincidence, some, present) -> Verdict:
-        """The verdict if ``some`` of the changes that are ``present`` come later."""
-        return self._verdict(coincidence, coincidence.after, some, present, self._later)
+    def row(self, coincidence, places, present) -> Verdict:
+        """The verdict of places in a row between the changes that are ``present``.
 
-    def earlier(self, coincidence, some, present) -> Verdict:
-        """The verdict if ``some`` of the changes that are ``present`` come earlier."""
-        return self._verdict(coincidence, coincidence.before, some, present, self._earlier)
+        Parameters
+        ----------
+        places : sequence of (int, collection)
+            the side of the boundary, and the changes that have happened in that place
+        """
+        beside = {BEFORE: coincidence.before, AFTER: coincidence.after}
+        numbers = {side: self._parts.by_extent.get(extent) for side, extent in beside.items()}
+        if any(numbers[side] is None for side, _ in places):
+            return Verdict.NONE
+        unchanged = {BEFORE: (), AFTER: present}
+        alone = tuple(self._row(numbers, coincidence, [(side, unchanged[side])], present)[0] for side, _ in places)
+        return self._subsolves.insertion(self._point, self._sets, self._row(numbers, coincidence, places, present), alone)
 
     def entered(self, way) -> Verdict:
         """The verdict of a change that has come in on both sides of an end between two rows: both must be possible."""
@@ -52,7 +63,7 @@ class OrdersByInsertion:
         if k is None:
             return Verdict.NONE
         order = Insertion(k, ahead, way.zero, self._sets.zero, (k, *self._parts.beside(k)))
-        return self._subsolves.insertion(self._point, self._sets, order, None)
+        return self._subsolves.insertion(self._point, self._sets, (order,), None)
 
     def at_end(self, changed) -> Verdict:
         """The verdict of a change that has come in at an end of all rows."""
@@ -64,36 +75,47 @@ class OrdersByInsertion:
         order = EndInsertion(end, inner, changed.zero, changed.targets, changed.sources)
         return self._subsolves.insertion_at_end(self._point, self._sets, order)
 
-    def _verdict(self, coincidence, extent, some, present, insertion):
-        k = self._parts.by_extent.get(extent)
-        if k is None:
-            return Verdict.NONE
-        order, unchanged = (insertion(k, coincidence, moved, present) for moved in (some, ()))
-        return self._subsolves.insertion(self._point, self._sets, order, unchanged)
+    def _row(self, numbers, coincidence, places, present) -> tuple:
+        """The insertions of places in a row; ``numbers`` are those of the parts on both sides of the boundary."""
+        (last_side, happened), found, before = places[-1], [], ()
+        following = numbers[last_side] + (last_side == BEFORE)
+        beside = self._with_gates(self._sets.zero, following, happened)
+        for side, those in places:
+            k, sides = numbers[side], {BEFORE: self._before, AFTER: self._after}[side]
+            zero = self._with_gates(sides(k, coincidence, those, present), k, before)
+            found.append(Insertion(k, side == AFTER, zero, beside, (k - 1 if side == AFTER else k + 1, k)))
+            before = those
+        return tuple(found)
 
-    def _later(self, k, coincidence, some, present):
-        zero, beside = self._sets.zero.copy(), self._sets.zero.copy()
-        for change in some:
-            self._take(zero, change.later, self._inside(change.later.targets, k))
-            zero[self._gate(change, k)] = G_ZERO
+    def _after(self, k, coincidence, happened, present):
+        """Zero sides with those of a copy of the part ``k`` after the boundary."""
+        zero = self._sets.zero.copy()
         for change in present:
-            if change not in some:
-                beside[self._gate(change, k)] = G_ZERO
-        return Insertion(k, True, zero, beside, (k - 1, k))
+            if change not in happened:
+                self._take(zero, change.later, self._inside(change.later.targets, k))
+                zero[self._gate(change, k)] = G_ZERO
+        return zero
 
-    def _earlier(self, k, coincidence, some, present):
-        zero, beside = self._sets.zero.copy(), self._sets.zero.copy()
+    def _before(self, k, coincidence, happened, present):
+        """Zero sides with those of a copy of the part ``k`` before the boundary."""
+        zero = self._sets.zero.copy()
         for change in coincidence.changes:
             moves = change.earlier
             of_part = self._parts.of_pair[moves.targets] == k
-            if change in some:
+            if change in happened:
                 self._take(zero, moves, of_part)
-                beside[self._gate(change, k + 1)] = G_ZERO
             elif change in present:
                 zero[self._gate(change, k)] = G_ZERO
             else:
                 self._take(zero, moves, of_part & self._parts.in_gate[moves.targets])
-        return Insertion(k, False, zero, beside, (k + 1, k))
+        return zero
+
+    def _with_gates(self, zero, k, happened):
+        """Zero sides in which part ``k`` does not begin with changes that have ``happened`` before."""
+        zero = zero.copy()
+        for change in happened:
+            zero[self._gate(change, k)] = G_ZERO
+        return zero
 
     def _take(self, zero, moves, chosen):
         zero[moves.targets[chosen]] = self._sets.zero[moves.sources[chosen]]

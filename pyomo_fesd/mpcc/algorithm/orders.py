@@ -2,51 +2,70 @@
 
 Each change comes apart from the others alone, or stays behind alone; at a boundary that does not move all together matter too.
 
+An order with more places than one consists of such places in a row (``rows``).
+
 Takes: the coincidences of a compiled MPCC, a point, and its active sets.
 Leaves: the orders.
-Does not apply: to orders that take more places than one, or two at an end (``follow_one_another`` tells where there may be some).
+Does not apply: to orders with more than two places at an end of a row (``has_more_at_end`` tells where there may be some).
 """
 
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import permutations
 
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.arrivals import Entered, branches
-from pyomo_fesd.mpcc.algorithm.insertions import OrdersByInsertion
-from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets
+from pyomo_fesd.mpcc.algorithm.insertions import AFTER, BEFORE, OrdersByInsertion
+from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets, Verdict
 
 #: A place nearer to its least extent than this may be none: NLP solvers leave it a little above its bound.
 NEAR_BOUND = 1e-4
 #: Places that come in at an end at a time.
 AT_END = 2
+#: Of so many changes each subset is a place of its own; rows with other places are not known.
+FEW = 3
 
 
 @dataclass(frozen=True)
 class Inserted:
     """What a place inserted at a coincidence holds.
 
-    ``happened`` are the numbers of the changes that have happened there, and ``side`` is 0 before a boundary that stays where it
-    is, 1 behind it or where there is none.
+    Attributes
+    ----------
+    side : int
+        BEFORE a boundary that stays where it is, AFTER it or where there is none
+    happened, present : frozenset of int
+        the numbers of the changes that have happened there, and of all
+    is_short : bool
+        whether a place at its lower bound was left out beside the coincidence, where nothing is inserted
     """
 
     coincidence: object
     side: int
     happened: frozenset
+    present: frozenset
+    is_short: bool
 
     @classmethod
-    def of(cls, coincidence, side, changes):
+    def of(cls, coincidence, side, changes, present, is_short):
         """The place in which ``changes`` have happened."""
-        return cls(coincidence, side, frozenset(map(coincidence.changes.index, changes)))
+        return cls(coincidence, side, *(frozenset(map(coincidence.changes.index, some)) for some in (changes, present)), is_short)
 
     def precedes(self, other):
         """Whether the other can follow it: one more place of the same coincidence, with no change undone."""
         if self == other or self.coincidence is not other.coincidence or self.side > other.side:
             return False
         return self.happened <= other.happened
+
+    def on_side(self, side):
+        """The side and the changes that have happened, for a copy on another ``side`` if there is no boundary that stays."""
+        return self.side if self.coincidence.fixed else side, self.changes(self.happened)
+
+    def changes(self, numbers) -> list:
+        """The changes with these numbers."""
+        return [self.coincidence.changes[k] for k in sorted(numbers)]
 
 
 @dataclass(frozen=True)
@@ -89,12 +108,12 @@ class Orders:
             for some in _subsets(present, coincidence.fixed):
                 rest = [change for change in present if change not in some]
                 moved = some if coincidence.fixed else rest
-                moves = (inserted.later, some), (inserted.earlier, moved)
-                judges = [partial(judge, coincidence, those, present) for judge, those in moves if at is sets]
+                rows = [(AFTER, rest)], [(BEFORE, moved)]
+                judges = [partial(inserted.row, coincidence, row, present) for row in rows if at is sets]
                 later, earlier = _moved(at.zero, [c.later for c in some]), _moved(at.zero, [c.earlier for c in moved])
                 later = _way(w, coincidence.later, later, coincidence.by_values_later, coincidence.beyond_later, at)
                 earlier = _way(w, coincidence.earlier, earlier, coincidence.by_values_earlier, coincidence.beyond_earlier, at)
-                before, after = (Inserted.of(coincidence, side, happened) for side, happened in enumerate((some, rest)))
+                after, before = (Inserted.of(coincidence, *row[0], present, at is not sets) for row in rows)
                 if coincidence.fixed:
                     yield Order(later, judges[:1], after)
                     yield Order(earlier, judges[1:], before)
@@ -103,6 +122,18 @@ class Orders:
         for entered, changed, alone in branches(self._c, w, sets, self._tolerances.biactive):
             judges = [partial(inserted.entered, entered), partial(inserted.at_end, changed)]
             yield Order([] if entered is None else [entered], judges, None if alone is None else AtEnd(*alone))
+
+    def judged(self, point, sets, row) -> Verdict:
+        """The verdict of places in a row."""
+        first = row[0]
+        if len(first.present) > FEW or any(place.is_short for place in row) or len({place.present for place in row}) > 1:
+            return Verdict.UNKNOWN
+        inserted, present = OrdersByInsertion(self._subsolves, point, sets), first.changes(first.present)
+        for side in (AFTER,) if first.coincidence.fixed else (AFTER, BEFORE):
+            verdict = inserted.row(first.coincidence, [place.on_side(side) for place in row], present)
+            if verdict not in (Verdict.UNKNOWN, Verdict.NONE):
+                return verdict
+        return Verdict.UNKNOWN
 
     def _situations(self, w, sets) -> Iterator[tuple]:
         """Each coincidence with the active sets; also those as if the place beside it, at its lower bound, were none."""
@@ -116,16 +147,26 @@ class Orders:
                     yield coincidence, ActiveSets(zero, np.zeros(len(zero), dtype=bool))
 
 
-def follow_one_another(possible):
-    """Whether there may be an order that is not tried: with one more place than is inserted at a time.
-
-    The changes that come apart in it stay together where fewer places are inserted, which may leave no direction at all.  At an end
-    of a row two places come in at a time, else one.
-    """
+def has_more_at_end(possible) -> bool:
+    """Whether there may be an order with more places at an end of a row than come in at a time."""
     at_ends = {place for place in possible if isinstance(place, AtEnd)}
-    inner = [place for place in possible if isinstance(place, Inserted)]
-    many = max(Counter(place.row for place in at_ends).values(), default=0) > AT_END
-    return many or any(one.precedes(other) for one, other in permutations(inner, 2))
+    return max(Counter(place.row for place in at_ends).values(), default=0) > AT_END
+
+
+def rows(possible) -> Iterator[tuple[Inserted, ...]]:
+    """Yield the rows of two or more ``possible`` places that follow one another.
+
+    The changes that come apart in a row stay together in each of its places alone, which may leave no direction at all.
+    """
+    yield from _longer((), [place for place in possible if isinstance(place, Inserted)])
+
+
+def _longer(row, places):
+    for place in places:
+        if not row or row[-1].precedes(place):
+            if row:
+                yield (*row, place)
+            yield from _longer((*row, place), places)
 
 
 def _differs(change, sets):

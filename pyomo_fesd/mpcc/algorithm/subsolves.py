@@ -101,7 +101,7 @@ class Subsolves:
         return result
 
     def insertion(self, point, sets, order, unchanged):
-        """The ``Verdict`` of a part that is inserted into a point; ``unchanged`` is one that changes nothing there."""
+        """The ``Verdict`` of parts that are inserted into a point in a row; ``unchanged`` are such that change nothing there."""
         return self._verdict(point, lambda equal: self._insertions.verdict(point.w, sets, equal, order, unchanged))
 
     def insertion_at_end(self, point, sets, order):

@@ -18,7 +18,7 @@ from scipy import sparse
 from pyomo_fesd.mpcc.subproblems.active_set import ActiveSets
 from pyomo_fesd.mpcc.subproblems.end_values import EndValues
 from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec, agree, linearised_at_both
-from pyomo_fesd.mpcc.subproblems.verdict import Verdict, of_growth
+from pyomo_fesd.mpcc.subproblems.verdict import Verdict, charge, of_growth
 
 
 class EndInsertions:
@@ -39,8 +39,8 @@ class EndInsertions:
             if verdict is not None:
                 return verdict
             return of_growth(
-                lambda credit: self._by_lpec(sets, equal, values, credit),
-                lambda: self._unchanged(w, sets, equal, order),
+                lambda credits: self._by_lpec(sets, equal, values, credits),
+                lambda: [self._charge(w, sets, equal, order)],
                 self._tolerances.descent,
             )
 
@@ -62,13 +62,14 @@ class EndInsertions:
             return Verdict.IMPOSSIBLE
         return Verdict.UNKNOWN if values.vanished.misses() else None
 
-    def _unchanged(self, w, sets, equal, order):
-        """The LPEC with a part at the end that changes nothing (None without one), and the place of its extent."""
+    def _charge(self, w, sets, equal, order):
+        """The descent per unit of a part at the end that changes nothing."""
         values = self._values(w, sets, replace(order, zero=sets.zero))
-        return self._by_lpec(sets, equal, values, 0.0) if values.solve() else None, values.extent
+        found = self._by_lpec(sets, equal, values, [0.0]) if values.solve() else None
+        return charge(found, values.extent, self._tolerances.descent)
 
-    def _by_lpec(self, sets, equal, values, credit):
-        """The LPEC in which the part at the end may grow at ``credit`` more for each unit; None where it is not known."""
+    def _by_lpec(self, sets, equal, values, credits):
+        """The LPEC in which the part at the end may grow at ``credits`` more for a unit; None where it is not known."""
         sets, radius = ActiveSets(values.zero, sets.gamma), self._tolerances.radius
         both = linearised_at_both(self._lpec, values.w, values.at_end, sets, radius, equal)
         if both is None:
@@ -77,8 +78,8 @@ class EndInsertions:
         joined = JoinedAtEnd(self._c, self._sides, self._parts, values, sets, equal)
         if not joined.applies(*joined.gradients(values.points)):
             return None
-        base, limits = joined.with_end(base, there), values.limits(radius, joined.fixed_by_following)
-        return joined.best(self._lpec, sets, base, values.points, credit, limits, values.fixed)
+        base, limits = joined.with_end(base, there), values.limits(radius)
+        return joined.best(self._lpec, sets, base, values.points, credits, [limits], [values.fixed])
 
 
 class JoinedAtEnd(JoinedLpec):
@@ -86,8 +87,9 @@ class JoinedAtEnd(JoinedLpec):
 
     def __init__(self, c, sides, parts, values, sets, equal):
         order = values.order
-        super().__init__(c, sides, parts, values.copied, order.inner if order.is_first else order.end, sets, equal)
-        self._values, self._of_end = values, parts.of_variable == order.end
+        super().__init__(c, sides, parts, (values.copied,), order.inner if order.is_first else order.end, sets, equal)
+        (self._copy,) = self.copies
+        self._values, self._of_e = values, parts.of_variable == order.end
         self._rows_of_end = parts.of_row[self._program_rows] == order.end
 
     def with_end(self, base, other):
@@ -101,9 +103,9 @@ class JoinedAtEnd(JoinedLpec):
         """Whether objective and shared rows are sums over the parts, and the copy contributes to the objective what e did."""
         rows, values = self._program_rows[self._shares], self._values
         # variables of no part may be factors of what e holds
-        others = (self._parts.of_variable >= 0) & ~self._of_end
+        others = (self._parts.of_variable >= 0) & ~self._of_e
         (cost, A), (cost_here, A_here) = ((cost[others], A[rows][:, others]) for cost, A in (before, here))
-        inside = ~np.isin(values.of_inner, [*values.ends, self._extent])
+        inside = ~np.isin(values.of_inner, [*values.ends, self._copy.extent])
         of_copy = held[0][values.of_inner[inside]]
         return agree(cost, cost_here) and agree(A.data, A_here.data) and agree(before[0][values.of_end[inside]], of_copy)
 
@@ -112,22 +114,22 @@ class JoinedAtEnd(JoinedLpec):
         (cost, A), (cost_here, A_here), (_, of_end), (cost_of_copy, of_copy) = before, here, at_end, held
         A, A_here, of_end = (some[self._program_rows] for some in (A, A_here, of_end))
         own, shared = sparse.diags(self._rows_of_end.astype(float)), sparse.diags(self._shares.astype(float))
-        among = sparse.diags(self._of_end.astype(float))
+        among = sparse.diags(self._of_e.astype(float))
         base = A + own @ (of_end - A) + shared @ (A_here - A) @ among
-        base = self._with_columns(base, self._follows, self._of_following)
+        base = self._with_columns(base, self._follows, self._passed_on)
         base = base + self._contributions(shared @ A, shared @ of_copy[self._program_rows])
-        new = self._with_columns(of_copy[self.rows], np.ones(len(self.rows), dtype=bool), self._of_copy)
+        new = self._with_columns(of_copy[self._copy.rows], np.ones(len(self._copy.rows), dtype=bool), self._copy.columns)
         cut = base.shape[0] - self._last
         source = self._source
-        of_copy = [cost[source[j]] if j in source and j in self._values.ends else cost_of_copy[j] for j in self.own]
-        cost = np.concatenate([np.where(self._of_end, cost_here, cost), of_copy])
+        of_copy = [cost[source[j]] if j in source and j in self._values.ends else cost_of_copy[j] for j in self._copy.own]
+        cost = np.concatenate([np.where(self._of_e, cost_here, cost), of_copy])
         return cost, sparse.vstack([base[:cut], new, base[cut:]], format='csr')
 
     def _contributions(self, A, of_copy):
         """Entries of shared rows in the columns of the copy: those that e had, or that i has."""
         source = self._source
-        entries = [A[:, source[j]] if j in source else of_copy[:, j] for j in self.own]
-        units = sparse.diags(np.where(self.own == self._extent, 1.0 / self._values.unit, 1.0))
+        entries = [A[:, source[j]] if j in source else of_copy[:, j] for j in self._copy.own]
+        units = sparse.diags(np.where(self._copy.own == self._copy.extent, 1.0 / self._values.unit, 1.0))
         return sparse.hstack([sparse.csr_matrix((A.shape[0], self._n)), sparse.hstack(entries) @ units], format='csr')
 
     @cached_property
@@ -138,5 +140,5 @@ class JoinedAtEnd(JoinedLpec):
         return {j: k for j, k in zip(values.of_inner, values.of_end) if j not in ends}
 
     @property
-    def _place_of_extent(self):
-        return self._values.extent
+    def _places_of_extents(self):
+        return [self._values.extent]

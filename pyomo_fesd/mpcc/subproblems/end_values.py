@@ -159,15 +159,12 @@ class EndValues:
         found[self._i.last] = self.held[self._i.last]
         return found
 
-    def limits(self, radius, fixed) -> tuple:
-        """Bounds of the rows and of the variables of the copy for a direction from its values, and the reach of the variables.
-
-        ``fixed`` are variables that do not move.
-        """
+    def limits(self, radius) -> tuple:
+        """Bounds of the rows and of the variables of the copy for a direction from its values, and the reach of the variables."""
         own, w, c = self._i.own, self.held, self._parts.of_copies
         low, high = self._copy.distances(w)
         reach = radius * sizes_of(w[own])
-        still = np.isin(own, [*self._copy.fixed, *fixed])
+        still = np.isin(own, self._copy.fixed)
         lower = np.where(still, 0.0, np.maximum(c.lbx[own] - w[own], -reach))
         upper = np.where(still, 0.0, np.minimum(c.ubx[own] - w[own], reach))
         return np.minimum(low, 0.0), np.maximum(high, 0.0), np.minimum(lower, 0.0), np.maximum(upper, 0.0), reach

@@ -54,6 +54,15 @@ class Insertion:
 class Copy:
     """A copy of a part.
 
+    Parameters
+    ----------
+    c : MpccFunctions or WithoutEndConditions
+    sides : Sides
+    parts : Parts
+    insertion : Insertion
+    is_first : bool
+        whether it begins with the last values of a part, and not with those of another copy
+
     Attributes
     ----------
     part : PartIndices
@@ -65,8 +74,8 @@ class Copy:
         the point with the values of the copy, at the limit, in place of those of the part
     """
 
-    def __init__(self, c, sides, parts, insertion):
-        self._c, self._sides, self._parts, self._insertion = c, sides, parts, insertion
+    def __init__(self, c, sides, parts, insertion, is_first=True):
+        self._c, self._sides, self._parts, self._insertion, self._is_first = c, sides, parts, insertion, is_first
         self.part, self.rows = parts.all[insertion.k], np.flatnonzero(parts.of_row == insertion.k)
         self.own, self._inner = self.part.own, np.setdiff1d(self.part.own, [self.part.extent])
         self._equations = InsertedPart(c, sides, parts, self._inner, self.rows, insertion.zero)
@@ -95,6 +104,12 @@ class Copy:
         self.limit = _limit(*self._at)
         self.limit[self.part.extent] = 0.0
         return True
+
+    def after(self, w):
+        """The point ``w`` with the values at the boundary that the copy has at its end."""
+        part, found = self.part, w.copy()
+        found[part.first if self._insertion.ahead else part.last] = self.limit[part.last]
+        return found
 
     @property
     def determined(self):
@@ -190,11 +205,11 @@ class Copy:
         return left[1] <= max(2.0 * RATIO**order * left[0], ROUND_OFF)
 
     def _before(self):
-        """The equations of the part whose last values the copy begins with; None without one."""
+        """The equations of the part whose last values the copy begins with; None without one, and after another copy."""
         k = self._insertion.k
         if self._insertion.ahead:
             k = self._parts.previous(k)
-        if k is None:
+        if k is None or not self._is_first:
             return None
         rows = np.flatnonzero(self._parts.of_row == k)
         return InsertedPart(self._c, self._sides, self._parts, self._parts.all[k].own, rows, self._insertion.zero_beside)
@@ -226,16 +241,13 @@ class Copy:
         low = np.concatenate([c.lbg, np.zeros(2 * q), none - np.inf])
         return (low - values)[self.rows], (high - values)[self.rows]
 
-    def limits(self, radius, fixed) -> tuple:
-        """Bounds of the rows and of the variables for a direction from the limit, and the reach of the variables.
-
-        ``fixed`` are variables that do not move either.
-        """
+    def limits(self, radius) -> tuple:
+        """Bounds of the rows and of the variables for a direction from the limit, and the reach of the variables."""
         c, own = self._c, self.own
         low, high = (_at_limit(*both) for both in zip(*map(self.distances, self._at)))
         lower, upper = (_at_limit(*both) for both in zip(*((c.lbx[own] - w[own], c.ubx[own] - w[own]) for w in self._at)))
         reach = radius * sizes_of(self.limit[own])
-        still, extent = np.isin(own, [*self.fixed, *fixed]), own == self.part.extent
+        still, extent = np.isin(own, self.fixed), own == self.part.extent
         lower, upper = np.where(still, 0.0, np.maximum(lower, -reach)), np.where(still, 0.0, np.minimum(upper, reach))
         lower[extent], upper[extent] = 0.0, radius
         return np.minimum(low, 0.0), np.maximum(high, 0.0), np.minimum(lower, 0.0), np.maximum(upper, 0.0), reach

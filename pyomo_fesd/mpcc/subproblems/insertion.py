@@ -1,19 +1,22 @@
-"""Whether a part inserted with extent zero may grow with descent (theory, section 4, orders).
+"""Whether parts inserted with extent zero may grow with descent (theory, section 4, orders).
 
-The copy of part k begins with the last values of the part before it, and the part after it with those of the copy:
+The first copy begins with the last values of the part before it, each one with those of the copy before, and the part after them
+with those of the last copy:
 
-    part j-1  ->  copy of k, of extent h  ->  part j,        j = k (before it) or j = k + 1 (after it)
+    part j-1  ->  copy of k, of extent h  -> ... ->  part j,        j = k (copies before it) or j = k + 1 (after it)
 
-With h = 0 this is the present point, whatever the zero sides of the copy.  Its values as h -> 0 show whether these sides are
-possible beside the point; if they are, the LPEC with the copy shows whether h may grow with descent.
+With h = 0 this is the present point, whatever the zero sides of the copies.  Their values as h -> 0 show whether these sides are
+possible beside the point; if they are, the LPEC with the copies shows whether extents may grow with descent.
 
-Takes: a point, and zero sides of the copy and of the part after it.
+Takes: a point, and zero sides of the copies and of the part after them.
 Leaves: a ``Verdict``.
-Does not apply: where the values of the copy have no limit; beside parts of nearly no extent; with fillings.
+Does not apply: where the values of a copy have no limit; beside parts of nearly no extent; with fillings.
 
 Values that the equations do not determine, as controls that vary within parts, are those of the part before or after the copy, and
 both must give the same verdict: stationarity is a local notion for them too.
 """
+
+from functools import partial
 
 import numpy as np
 
@@ -21,7 +24,7 @@ from pyomo_fesd.mpcc.subproblems.active_set import ActiveSets
 from pyomo_fesd.mpcc.subproblems.inserted_copy import Copy, Insertion
 from pyomo_fesd.mpcc.subproblems.inserted_part import InsertedPart
 from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec, linearised_at_both
-from pyomo_fesd.mpcc.subproblems.verdict import Verdict, of_all, of_growth
+from pyomo_fesd.mpcc.subproblems.verdict import Verdict, charge, of_all, of_growth
 
 
 class Insertions:
@@ -39,37 +42,45 @@ class Insertions:
     def __init__(self, c, sides, parts, lpec, tolerances):
         self._c, self._sides, self._parts, self._lpec, self._tolerances = c, sides, parts, lpec, tolerances
 
-    def verdict(self, w, sets, equal, insertion, present) -> Verdict:
-        """Judge an insertion into the point ``w`` with active sets ``sets`` and the decisions ``equal`` in force.
+    def verdict(self, w, sets, equal, insertions, present) -> Verdict:
+        """Judge insertions in a row into the point ``w`` with active sets ``sets`` and the decisions ``equal`` in force.
 
         Parameters
         ----------
-        present : Insertion or None
-            at the same place, with the sides that are there already: a descent that it has too is one of uneven extents.  None:
-            whether the copy may grow is not looked at
+        insertions : tuple of Insertion
+            one after the other, between the same two parts
+        present : tuple of Insertion, or None
+            for each of them, alone at the same place, with the sides that are there already: a descent that it has too is one of
+            uneven extents.  None: whether the copies may grow is not looked at
         """
-        part, found = self._parts.all[insertion.k], []
-        if not self._parts.may_be_copied(insertion.k):
+        if not all(self._parts.may_be_copied(insertion.k) for insertion in insertions):
             return Verdict.NONE
-        if not self._applies(w, insertion, grows=present is not None):
+        if not all(self._applies(w, insertion, grows=present is not None) for insertion in insertions):
             return Verdict.UNKNOWN
-        with self._c.vanishing(np.array([part.extent])):
-            for guess in insertion.guesses:
-                copy = self._copy(insertion)
-                found.append(self._of_copy(w, sets, equal, insertion, copy, guess, present))
-                if copy.determined and found[-1] is not Verdict.UNKNOWN:
-                    return found[-1]
+        with self._c.vanishing(np.array([self._parts.all[k].extent for k in {insertion.k for insertion in insertions}])):
+            grown = None if present is None else partial(self._growth, w, sets, equal, insertions, present)
+            return self._in_row(insertions, [], w, grown)
+
+    def _in_row(self, insertions, copies, w, grown):
+        """The verdict of a row of which the first ``copies`` are known, from the values ``w`` with which the next one begins."""
+        if len(copies) == len(insertions):
+            return Verdict.UNKNOWN if grown is None else grown(copies)
+        insertion, found = insertions[len(copies)], []
+        for guess in insertion.guesses:
+            copy = self._copy(insertion, is_first=not copies)
+            verdict = self._by_values(w, insertion, copy, guess)
+            found.append(verdict or _of_rest(self._in_row(insertions, [*copies, copy], copy.after(w), grown)))
+            if copy.determined and found[-1] is not Verdict.UNKNOWN:
+                return found[-1]
         return of_all(found)
 
-    def _of_copy(self, w, sets, equal, insertion, copy, guess, present):
-        """The verdict by a copy that starts from the values of one part."""
-        verdict = self._by_values(w, insertion, copy, guess)
-        if verdict is not None or present is None:
-            return verdict or Verdict.UNKNOWN
+    def _growth(self, w, sets, equal, insertions, present, copies):
+        """The verdict of copies whose sides are possible."""
         return of_growth(
-            lambda credit: self._by_lpec(w, sets, equal, insertion, copy, credit),
-            lambda: self._unchanged(w, sets, equal, present),
+            lambda credits: self._by_lpec(w, sets, equal, insertions, copies, credits),
+            lambda: [self._charge(w, sets, equal, unchanged) for unchanged in present],
             self._tolerances.descent,
+            len(copies),
         )
 
     def at_limit(self, w, zero, extents, size):
@@ -112,14 +123,14 @@ class Insertions:
             return Verdict.UNKNOWN if copy.misses() else None
         return Verdict.IMPOSSIBLE if copy.contradicts_itself(w, insertion.guesses) else Verdict.UNKNOWN
 
-    def _unchanged(self, w, sets, equal, present):
-        """The LPEC with a copy that changes nothing (None without one), and the place of its extent."""
-        copy = self._copy(present)
-        found = self._by_lpec(w, sets, equal, present, copy, 0.0) if copy.solve(w, present.guesses) else None
-        return found, len(w) + int(np.flatnonzero(copy.own == copy.part.extent)[0])
+    def _charge(self, w, sets, equal, unchanged):
+        """The descent per unit of a copy that changes nothing."""
+        copy = self._copy(unchanged)
+        found = self._by_lpec(w, sets, equal, (unchanged,), [copy], [0.0]) if copy.solve(w, unchanged.guesses) else None
+        return charge(found, len(w) + int(np.flatnonzero(copy.own == copy.part.extent)[0]), self._tolerances.descent)
 
-    def _copy(self, insertion):
-        return Copy(self._parts.of_copies, self._sides, self._parts, insertion)
+    def _copy(self, insertion, is_first=True):
+        return Copy(self._parts.of_copies, self._sides, self._parts, insertion, is_first)
 
     def _following(self, insertion):
         """The part after the copy."""
@@ -144,10 +155,10 @@ class Insertions:
         inner[self._parts.all[k].gate] = inner[self._parts.all[k].extent] = False
         return rows[self._parts.pattern[rows] @ inner.astype(float) == 0]
 
-    def _by_lpec(self, w, sets, equal, insertion, copy, credit):
-        """The LPEC with the copy, growing at ``credit`` more for each unit; None where it is not known."""
-        following = self._following(insertion)
-        beside = self._beside(w, sets.zero, insertion, copy)
+    def _by_lpec(self, w, sets, equal, insertions, copies, credits):
+        """The LPEC with the copies, growing at ``credits`` more for each unit; None where it is not known."""
+        *_, insertion = insertions
+        following, beside = self._following(insertion), self._beside(w, sets.zero, insertion, copies[-1])
         if beside is None:
             return None
         sets, radius = ActiveSets(insertion.zero_beside, sets.gamma & (insertion.zero_beside == sets.zero)), self._tolerances.radius
@@ -155,8 +166,15 @@ class Insertions:
         if both is None:
             return None
         sets, equal, base, there = both
-        joined = JoinedLpec(self._c, self._sides, self._parts, insertion, following, sets, equal)
-        if not joined.is_known(w, copy.limit):
+        joined = JoinedLpec(self._c, self._sides, self._parts, insertions, following, sets, equal)
+        limits = [copy.limit for copy in copies]
+        if not joined.is_known(w, *limits):
             return None
-        base, limits = joined.with_following(base, there), copy.limits(radius, joined.fixed_by_following)
-        return joined.best(self._lpec, sets, base, (w, beside, copy.limit), credit, limits, copy.fixed)
+        base, points = joined.with_following(base, there), (w, beside, *limits)
+        bounds, fixed = zip(*((copy.limits(radius), copy.fixed) for copy in copies))
+        return joined.best(self._lpec, sets, base, points, credits, bounds, fixed)
+
+
+def _of_rest(verdict):
+    """The verdict of a row by that of its rest: what is not possible after some values of a copy has no descent there."""
+    return Verdict.NO_DESCENT if verdict is Verdict.IMPOSSIBLE else verdict

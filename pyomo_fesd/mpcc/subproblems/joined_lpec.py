@@ -1,14 +1,14 @@
-"""The LPEC of a model with a copy of one of its parts, assembled from matrices of the model itself.
+"""The LPEC of a model with copies of its parts in a row, assembled from matrices of the model itself.
 
-    rows of the model            at the point; those of the part after the copy begin with the last values of the copy
-    rows of the copied part      at the values of the copy, in columns of its own; they begin with the last values before it
-    shared rows and objective    get the column of the extent of the copy; where that is 0, no other variable inside it matters
+    rows of the model            at the point; those of the part after the copies begin with the last values of the last copy
+    rows of each copied part     at the values of the copy, in columns of its own; they begin with the last values before it
+    shared rows and objective    get the column of the extent of each copy; where that is 0, no other variable inside it matters
 
-A copy behind part k ends where k ended.  So it takes over from k the conditions on its end, and what shared rows and objective have
-of its last values.
+A copy behind part k ends where k ended.  So the last one behind k takes over from k the conditions on its end, and what shared
+rows and objective have of its last values.
 
-Takes: the LPEC at the point, and gradients at the point, beside the copy, and in the copy.
-Leaves: a ``Linearised`` LPEC, whose last variables are those of the copy.
+Takes: the LPEC at the point, and gradients at the point, beside the copies, and in each copy.
+Leaves: a ``Linearised`` LPEC, whose last variables are those of the copies, one after the other.
 Does not apply: where objective or shared rows are not sums over the parts; where such last values change with the mode.
 """
 
@@ -18,6 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from pyomo_fesd.mpcc.subproblems.active_set import FREE
+from pyomo_fesd.mpcc.subproblems.copy_columns import columns_of_row
 from pyomo_fesd.mpcc.subproblems.descent import Descent
 from pyomo_fesd.mpcc.subproblems.linear_program import Program
 from pyomo_fesd.mpcc.subproblems.lpec import Linearised, row_places, sizes_of
@@ -28,33 +29,40 @@ SAME = 1e-6
 
 
 class JoinedLpec:
-    """Joins the model and the copy of one insertion; ``following`` is the part after the copy."""
+    """Joins the model and copies of parts.
 
-    def __init__(self, c, sides, parts, insertion, following, sets, equal):
-        self._c, part, n = c, parts.all[insertion.k], len(c.x0)
-        self.rows, self.own = np.flatnonzero(parts.of_row == insertion.k), part.own
-        self._n, self._extent = n, part.extent
+    Parameters
+    ----------
+    insertions : tuple of Insertion
+        one after the other, those behind a part first
+    following : int
+        the part after the copies
+
+    Attributes
+    ----------
+    copies : list of CopyColumns
+    """
+
+    def __init__(self, c, sides, parts, insertions, following, sets, equal):
+        self._c, self._n, self._parts, self._following = c, len(c.x0), parts, following
+        self.copies = columns_of_row(parts, insertions, self._n)
+        self._width = self._n + sum(len(copy.own) for copy in self.copies)
         self._program_rows = np.concatenate(row_places(sets, equal, len(c.lbg)))
         self._last = 2 * int(sets.gamma.sum())
-        place = {j: n + i for i, j in enumerate(part.own)}
-        passed_on = dict(zip(part.first, part.last)) if insertion.ahead else {j: j for j in part.last}
-        self._of_following = {j: place[last] for j, last in passed_on.items() if last in place}
-        self._of_copy = place | ({} if insertion.ahead else dict(zip(part.first, part.last)))
-        still = sides.fixed_by(sets.zero, parts.of_pair == following)
-        self.fixed_by_following = [passed_on[j] for j in still if j in self._of_following]
+        self._still = sides.fixed_by(sets.zero, parts.of_pair == following)
         self._follows = parts.of_row[self._program_rows] == following
         self._shares = parts.of_row[self._program_rows] == SHARED
-        self._parts, self._following, self._k = parts, following, insertion.k
         # pairs are no sums over the parts, and no part with pairs as conditions on its end is copied
         self._shared_rows = self._shares & (self._program_rows < len(c.lbg))
-        self._end_rows = np.isin(self._program_rows, np.intersect1d(self.rows, np.flatnonzero(parts.of_copies.is_condition)))
-        # a copy behind part k ends where that ended
-        self._ends = {} if insertion.ahead else {j: place[j] for j in part.ends}
-        # a condition on the end of k, and on the end of the part before it, does not begin with the copy ahead of k
-        self._begins = self._follows & ~self._end_rows
+        own = self._program_rows < len(c.lbg)
+        is_condition = np.zeros(len(own), dtype=bool)
+        is_condition[own] = parts.of_copies.is_condition[self._program_rows[own]]
+        # copies ahead of the part after them come between a condition on its end and the values before it that this contains
+        self._begins, self._condition_begins = self._follows & ~is_condition, self._follows & is_condition
+        self._end_rows = is_condition & (parts.of_row[self._program_rows] == self.copies[0].k) & ~self._follows
 
     def with_following(self, base, other):
-        """The LPEC with the rows and variables of the part after the copy linearised at another point."""
+        """The LPEC with the rows and variables of the part after the copies linearised at another point."""
         return self._with_part(base, other, self._following)
 
     def _with_part(self, base, other, k):
@@ -72,54 +80,58 @@ class JoinedLpec:
         """Gradient of the objective and Jacobian of all rows at each point."""
         return [(self._c.gradients(at)[0], self._c.stacked_jacobian(at)) for at in points]
 
-    def is_known(self, here, there) -> bool:
-        """Whether objective and shared rows are sums over the parts, and the copy ends with the values that it takes over.
+    def is_known(self, here, *there) -> bool:
+        """Whether objective and shared rows are sums over the parts, and copies end with the values that they take over.
 
         Parameters
         ----------
-        here, there : arrays (n)
-            the point, and that in the copy
+        here : array (n)
+            the point
+        there : arrays (n)
+            those in the copies
         """
-        (cost, A), (cost_of_copy, of_copy) = self.gradients((here, self._in_place(here, there)))
+        (before, *points) = self.gradients((here, *(copy.in_place(here, at) for copy, at in zip(self.copies, there))))
+        return all(self._is_known(copy, before, of_copy, here, at) for copy, of_copy, at in zip(self.copies, points, there))
+
+    def _is_known(self, copy, at_point, in_copy, here, there):
+        (cost, A), (cost_of_copy, of_copy) = at_point, in_copy
         rows = self._program_rows[self._shared_rows]
-        others = (self._parts.of_variable >= 0) & (self._parts.of_variable != self._k)
+        others = (self._parts.of_variable >= 0) & (self._parts.of_variable != copy.k)
         sums = agree(cost[others], cost_of_copy[others]) and agree(A[rows][:, others].data, of_copy[rows][:, others].data)
-        ends = np.array(list(self._ends), dtype=int)
+        ends = np.array(list(copy.ends), dtype=int)
         rows = of_copy[np.union1d(rows, self._program_rows[self._end_rows])][:, ends]
         matter = self._parts.of_copies.is_bounded[ends] | (cost_of_copy[ends] != 0.0) | (np.diff(rows.tocsc().indptr) > 0)
         change = np.abs(there - here)[ends] > SAME * sizes_of(here[ends])
         return sums and not np.any(matter & change)
 
-    def _in_place(self, here, there):
-        """The point ``here`` with the values of the copy in place of those of the part."""
-        found = here.copy()
-        found[self.own] = there[self.own]
-        return found
+    def best(self, lpec, sets, base, points, credits, limits, fixed):
+        """The best direction of the LPEC with the copies, which grow at the ``credits`` more for each unit.
 
-    def best(self, lpec, sets, base, points, credit, limits, fixed):
-        """The best direction of the LPEC with the copy, which grows at ``credit`` more for each unit.
-
-        The first of the ``points`` is the one without a copy; the variables ``fixed`` of the copy do not move.
+        The first of the ``points`` is the one without copies; ``limits`` and variables that are ``fixed`` are those of each copy.
         """
         base = replace(base, program=self._unfixed(lpec, points[0], sets, base.program))
-        at = self.linearised(base, self.gradients(points), credit, limits, fixed)
+        at = self.linearised(base, self.gradients(points), credits, limits, fixed)
         descent = Descent(at.program, lambda: [(cost, A.T.dot) for cost, A in self.changes(*map(lpec.changes, points))])
         return lpec.best(sets, at, descent, True)
 
-    def linearised(self, base, points, credit, limits, fixed):
-        """The LPEC with the copy, without its binaries."""
-        p, y, (low, high, lower, upper, reach) = self._with_fixed(base.program, fixed), self._last, limits
+    def linearised(self, base, points, credits, limits, fixed):
+        """The LPEC with the copies, without its binaries."""
+        p, y = self._with_fixed(base.program, fixed), self._last
+        low, high, lower, upper, reach = (list(of_copies) for of_copies in zip(*limits))
         cost, A = self._joined(*points)
-        cost[self._place_of_extent] += credit
+        cost[self._places_of_extents] += credits
         low, high = (self._inserted(given, new) for given, new in ((p.low, low), (p.high, high)))
-        lower, upper, reach = map(np.concatenate, ((p.lower, lower), (p.upper, upper), (p.reach, reach)))
+        of_variables = (p.lower, lower), (p.upper, upper), (p.reach, reach)
+        lower, upper, reach = (np.concatenate([given, *new]) for given, new in of_variables)
+        still = self._fixed_ends(fixed)
+        lower[still] = upper[still] = 0.0
         self._pass_on_bounds(lower, upper, reach)
         program = Program(cost, A, low, high, lower, upper, reach)
         half = A.shape[0] - y // 2
         return Linearised(program, base.equal, base.G, base.H, A[A.shape[0] - y : half], A[half:])
 
     def _pass_on_bounds(self, lower, upper, reach):
-        """Make bounds that are conditions on the end of k those of the end of the copy behind it."""
+        """Make bounds that are conditions on the end of k those of the end of the last copy behind it."""
         for j, of_copy in self._ends.items():
             if self._parts.of_copies.is_bounded[j]:
                 # one that its sides fix has bounds no longer; without those of the copy there is only more descent
@@ -128,19 +140,25 @@ class JoinedLpec:
                 lower[j], upper[j] = -reach[j], reach[j]
 
     def _unfixed(self, lpec, w, sets, program):
-        """A program in which first values of the part after the copy are not fixed by its sides: they are those of the copy now."""
+        """A program in which the sides of the part after the copies do not fix its first values: they are the last copy's."""
         sets = replace(sets, zero=np.where(self._parts.of_pair == self._following, FREE, sets.zero))
-        (lower, upper), j = lpec.box(w, sets, program.reach, beyond=True), list(self._of_following)
+        (lower, upper), j = lpec.box(w, sets, program.reach, beyond=True), list(self._passed_on)
         low, high = program.lower.copy(), program.upper.copy()
         low[j], high[j] = lower[j], upper[j]
         return replace(program, lower=low, upper=high)
 
     def _with_fixed(self, program, fixed):
-        """A program in which variables that the sides of the copy fix do not move."""
-        j = np.array([self._of_copy.get(i, i) for i in fixed], dtype=int)
+        """A program in which values at the boundary that the sides of the first copy fix, and those of no part, do not move."""
         low, high = program.lower.copy(), program.upper.copy()
-        low[j[j < self._n]] = high[j[j < self._n]] = 0.0
+        of_model = [copy.of_model(some) for copy, some in zip(self.copies, fixed)]
+        j = of_model[0] + [j for some in of_model[1:] for j in some if self._parts.of_variable[j] < 0]
+        low[j] = high[j] = 0.0
         return replace(program, lower=low, upper=high)
+
+    def _fixed_ends(self, fixed) -> list:
+        """Columns of last values of copies that the sides of what follows them fix."""
+        follow = [copy.of_model(some) for copy, some in zip(self.copies[1:], fixed[1:])]
+        return [j for copy, some in zip(self.copies, [*follow, self._still]) for j in copy.at_its_end(some)]
 
     def changes(self, *points):
         """Changes of cost and rows along displacements."""
@@ -149,43 +167,60 @@ class JoinedLpec:
     def _inserted(self, given, new):
         """Rows of bi-active pairs stay the last ones."""
         cut = len(given) - self._last
-        return np.concatenate([given[:cut], new, given[cut:]])
+        return np.concatenate([given[:cut], *new, given[cut:]])
 
-    def _joined(self, here, beside, there):
-        """Cost and rows of the model with the copy, of those at the point, beside the copy, and in the copy."""
-        (cost, A), (_, of_following), (cost_of_copy, of_copy) = here, beside, there
+    def _joined(self, here, beside, *there):
+        """Cost and rows of the model with the copies, of those at the point, beside the copies, and in each copy."""
+        (cost, A), (_, of_following) = here, beside
         follows = sparse.diags(self._follows.astype(float))
         A = A[self._program_rows]
         A = A + follows @ (of_following[self._program_rows] - A)
-        ends, ends_of_copy = list(self._ends), list(self._ends.values())
-        cost = np.concatenate([cost, np.zeros(len(self.own))])
-        cost[[self._place_of_extent, *ends_of_copy]] = cost_of_copy[[self._extent, *ends]]
-        cost[ends] -= cost_of_copy[ends]
-        base = self._with_columns(A, self._begins, self._of_following)
+        base = self._with_columns(A, self._begins, self._passed_on)
+        base = self._with_columns(base, self._condition_begins, self._of_end.passed_on if self._of_end else {})
         base = self._with_columns(base, self._end_rows, self._ends)
-        base = base + self._entries(of_copy, self._shares, [self._extent], [self._place_of_extent])
-        passed_on, given_up = (self._entries(of_copy, self._shared_rows, ends, columns) for columns in (ends_of_copy, ends))
-        base = base + passed_on - given_up
-        new = self._with_columns(of_copy[self.rows], np.ones(len(self.rows), dtype=bool), self._of_copy)
+        cost, new = np.concatenate([cost, np.zeros(self._width - self._n)]), []
+        for copy, (cost_of_copy, of_copy) in zip(self.copies, there):
+            ends, of_ends = list(copy.ends), list(copy.ends.values())
+            cost[[copy.place_of_extent, *of_ends]] = cost_of_copy[[copy.extent, *ends]]
+            cost[ends] -= cost_of_copy[ends]
+            base = base + self._entries(of_copy, self._shares, [copy.extent], [copy.place_of_extent])
+            passed_on, given_up = (self._entries(of_copy, self._shared_rows, ends, columns) for columns in (of_ends, ends))
+            base = base + passed_on - given_up
+            new.append(self._with_columns(of_copy[copy.rows], np.ones(len(copy.rows), dtype=bool), copy.columns))
         cut = base.shape[0] - self._last
-        return cost, sparse.vstack([base[:cut], new, base[cut:]], format='csr')
+        return cost, sparse.vstack([base[:cut], *new, base[cut:]], format='csr')
 
     @property
-    def _place_of_extent(self):
-        return self._n + int(np.flatnonzero(self.own == self._extent)[0])
+    def _passed_on(self):
+        """Variables at the boundary -> columns of the values with which the part after the copies begins."""
+        return self.copies[-1].passed_on
+
+    @property
+    def _ends(self):
+        """Variables at the end of the part before the copies -> columns of the copy that ends there instead."""
+        return self._of_end.ends if self._of_end else {}
+
+    @property
+    def _of_end(self):
+        """The copy that ends where the part before the copies ended; None without one."""
+        return next((copy for copy in self.copies if copy.ends), None)
+
+    @property
+    def _places_of_extents(self):
+        return [copy.place_of_extent for copy in self.copies]
 
     def _entries(self, A, chosen, given, columns):
         """Entries of the ``chosen`` rows of the program in the columns ``given``, moved to other ``columns``, and nothing else."""
         found = (sparse.diags(chosen.astype(float)) @ A[self._program_rows])[:, given].tocoo()
         columns = np.array(columns, dtype=int)[found.col]
-        return sparse.csr_matrix((found.data, (found.row, columns)), (found.shape[0], self._n + len(self.own)))
+        return sparse.csr_matrix((found.data, (found.row, columns)), (found.shape[0], self._width))
 
     def _with_columns(self, A, chosen, places):
-        """Rows in the columns of the model and of the copy; entries of the ``chosen`` rows move to other ``places``."""
-        entries, move = A.tocoo(), np.arange(self._n + len(self.own))
+        """Rows in the columns of the model and of the copies; entries of the ``chosen`` rows move to other ``places``."""
+        entries, move = A.tocoo(), np.arange(self._width)
         move[list(places)] = list(places.values())
         columns = np.where(chosen[entries.row], move[entries.col], entries.col)
-        return sparse.csr_matrix((entries.data, (entries.row, columns)), (A.shape[0], self._n + len(self.own)))
+        return sparse.csr_matrix((entries.data, (entries.row, columns)), (A.shape[0], self._width))
 
 
 def agree(a, b) -> bool:

@@ -17,25 +17,28 @@ class Verdict(Enum):
     NONE = 'nothing can be inserted there'
 
 
-def of_growth(lpec, unchanged, enough) -> Verdict:
-    """The verdict of the LPEC in which a part may grow, where a relative descent below ``enough`` does not count.
+def of_growth(lpec, charges, enough, number=1) -> Verdict:
+    """The verdict of the LPEC in which some parts may grow, where a relative descent below ``enough`` does not count.
 
     Parameters
     ----------
     lpec : callable
-        of the cost of a unit of the part's extent; None where there is no LPEC
-    unchanged : callable
-        the same LPEC for a part that changes nothing, whose descent is the error of the method, and the place of its extent
+        of the costs of a unit of each part's extent; None where there is no LPEC
+    charges : callable
+        the descents per unit of parts that change nothing there, which are errors of the method
+    number : int
+        of parts
     """
-    found = lpec(0.0)
+    found = lpec([0.0] * number)
     if found is not None and found.descent > enough:
-        found = lpec(_descent_of_unit(*unchanged(), enough))
+        found = lpec(charges())
     if found is None or not found.solved:
         return Verdict.UNKNOWN
     return Verdict.DESCENT if found.descent > enough else Verdict.NO_DESCENT
 
 
-def _descent_of_unit(found, extent, enough):
+def charge(found, extent, enough) -> float:
+    """The descent per unit of the variable ``extent`` in the LPEC of a part that changes nothing; 0 without one."""
     if found is None or not found.solved or found.descent <= enough:
         return 0.0
     return -found.value / found.d[extent] if found.d[extent] > 0 else 0.0

@@ -52,5 +52,5 @@ def test_a_copy_at_its_limit_misses_no_row():
     s = inserted.simulated(5, 'heaviside')
     copy = copy_of(s, 1, 1)
     assert copy.solve(s.w, (1,))
-    low, high, lower, upper, _ = copy.limits(1.0, [])
+    low, high, lower, upper, _ = copy.limits(1.0)
     assert np.all(low <= 0) and np.all(high >= 0) and np.all(lower <= 0) and np.all(upper >= 0)

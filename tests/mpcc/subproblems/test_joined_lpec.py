@@ -1,4 +1,4 @@
-"""The LPEC with a copy of a part, against the model that has one more part."""
+"""The LPEC with copies of parts, against the model that has more parts."""
 
 import numpy as np
 import pytest
@@ -13,43 +13,54 @@ from pyomo_fesd.mpcc.subproblems.lpec import Lpec
 STEP = 1e-6
 
 
-def joined(short, k, ahead):
-    """Matrix and cost of the joined LPEC at a random point; the copy has random values of its own."""
+def joined(short, copies):
+    """Matrix and cost of the joined LPEC at a random point; ``copies``, each a part and whether ahead of it, have random values too."""
     c, parts, w = short.c, short.parts, short.w
     sides = np.random.default_rng(1).integers(0, 2, c.pairs)
     sets, equal = ActiveSets(sides, np.zeros(c.pairs, dtype=bool)), np.zeros(c.equal.numel(), dtype=bool)
-    insertion = Insertion(k, ahead, sides, sides, (k,))
-    following = k if ahead else k + 1
-    lpec = JoinedLpec(c, short.sides, parts, insertion, following, sets, equal)
+    insertions = tuple(Insertion(k, ahead, sides, sides, (k,)) for k, ahead in copies)
+    following = following_part(copies)
+    lpec = JoinedLpec(c, short.sides, parts, insertions, following, sets, equal)
     _, _, base = Lpec(c, short.sides, {}).linearised(w, sets, 1.0, equal)
-    part = parts.all[k]
-    values = np.random.default_rng(2).uniform(0.2, 0.9, len(part.own))
-    values[part.own == part.extent] = 0.0
-    place, there, beside = {j: i for i, j in enumerate(part.own)}, w.copy(), w.copy()
-    there[part.own] = values
-    ended = values[[place[j] for j in part.last]]
-    if ahead:
-        beside[part.first] = ended
-    else:
-        there[part.first] = w[part.last]
-        beside[parts.all[following].first] = ended
-    points = [(c.gradients(at)[0], c.stacked_jacobian(at)) for at in (w, beside, there)]
-    empty = [np.zeros(len(lpec.rows))] * 2 + [np.zeros(len(part.own))] * 3
-    program = lpec.linearised(base, points, 0.0, empty, []).program
-    # rows of decisions have no bounds in the copy
-    bounded = np.append(np.ones(program.A.shape[0] - len(lpec.rows), dtype=bool), lpec.rows < len(c.lbg) + 2 * c.pairs)
-    return program.A[bounded], program.cost, values
+    values, points, random = [], [w], np.random.default_rng(2)
+    ended = w[parts.all[following].first]
+    for k, _ in copies:
+        part, there = parts.all[k], w.copy()
+        own = random.uniform(0.2, 0.9, len(part.own))
+        own[part.own == part.extent] = 0.0
+        there[part.own] = own
+        there[part.first] = ended
+        ended = there[part.last]
+        values.append(own)
+        points.append(there)
+    beside = w.copy()
+    beside[parts.all[following].first] = ended
+    points.insert(1, beside)
+    empty = [[np.zeros(len(copy.rows))] * 2 + [np.zeros(len(copy.own))] * 3 for copy in lpec.copies]
+    none = [[] for _ in copies]
+    program = lpec.linearised(base, lpec.gradients(points), [0.0] * len(copies), empty, none).program
+    # rows of decisions have no bounds in the copies
+    of_model = program.A.shape[0] - sum(len(copy.rows) for copy in lpec.copies)
+    bounded = [np.ones(of_model, dtype=bool), *(copy.rows < len(c.lbg) + 2 * c.pairs for copy in lpec.copies)]
+    return program.A[np.concatenate(bounded)], program.cost, values
 
 
-def of_longer(short, longer, k, ahead, values):
+def following_part(copies):
+    """The part after the copies."""
+    k, ahead = copies[-1]
+    return k if ahead else k + 1
+
+
+def of_longer(short, longer, copies, values):
     """Its matrix by finite differences and its cost, in the columns of the joined LPEC."""
-    at = k if ahead else k + 1
+    at, number = following_part(copies), len(copies)
     n, w, columns = len(short.w), longer.c.x0.copy(), np.full(len(longer.c.x0), -1)
+    firsts = n + np.concatenate([[0], np.cumsum([len(own) for own in values])])
     for j, part in enumerate(longer.parts.all):
-        if j == at:
-            w[part.own], columns[part.own] = values, n + np.arange(len(part.own))
+        if at <= j < at + number:
+            w[part.own], columns[part.own] = values[j - at], firsts[j - at] + np.arange(len(part.own))
         else:
-            source = short.parts.all[j - (j > at)].own
+            source = short.parts.all[j - number * (j >= at)].own
             w[part.own], columns[part.own] = short.w[source], source
     for j in np.flatnonzero(columns < 0):
         columns[j] = short.names.index(longer.names[j])
@@ -59,7 +70,7 @@ def of_longer(short, longer, k, ahead, values):
         found = longer.c.evaluate(w)
         return np.concatenate([found.g, found.G, found.H]), found.f
 
-    J, cost = np.zeros((len(rows(w)[0]), n + len(values))), np.zeros(n + len(values))
+    J, cost = np.zeros((len(rows(w)[0]), firsts[-1])), np.zeros(firsts[-1])
     for j, column in enumerate(columns):
         step = STEP * np.eye(len(w))[j]
         (up, f_up), (down, f_down) = rows(w + step), rows(w - step)
@@ -73,11 +84,24 @@ def sorted_rows(A):
 
 
 @pytest.mark.parametrize('form', ['heaviside', 'stewart'])
-@pytest.mark.parametrize('k, ahead', [(1, True), (2, True), (1, False), (2, False)])
-def test_the_rows_are_those_of_the_model_with_one_more_part(form, k, ahead):
-    short, longer = inserted.compiled(4, form), inserted.compiled(5, form)
-    A, cost, values = joined(short, k, ahead)
-    expected, of_objective = of_longer(short, longer, k, ahead, values)
+@pytest.mark.parametrize(
+    'copies',
+    [
+        [(1, True)],
+        [(2, True)],
+        [(1, False)],
+        [(2, False)],
+        [(1, True), (1, True)],
+        [(1, False), (1, False)],
+        [(1, False), (2, True)],
+        [(1, False), (1, False), (2, True)],
+    ],
+    ids=str,
+)
+def test_the_rows_are_those_of_the_model_with_more_parts(form, copies):
+    short, longer = inserted.compiled(4, form), inserted.compiled(4 + len(copies), form)
+    A, cost, values = joined(short, copies)
+    expected, of_objective = of_longer(short, longer, copies, values)
     assert A.shape == expected.shape
     assert np.allclose(sorted_rows(A), sorted_rows(expected), atol=2e-5)
     assert cost == pytest.approx(of_objective, abs=1e-6)

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from pyomo_fesd.mpcc.subproblems import Verdict
-from pyomo_fesd.mpcc.subproblems.verdict import of_all, of_growth
+from pyomo_fesd.mpcc.subproblems.verdict import charge, of_all, of_growth
 
 
 def lpec(slope, solved=True):
     """An LPEC with one variable, which may grow by 1 with this slope, at a cost of each unit."""
 
-    def best(credit):
+    def best(credits):
+        (credit,) = credits
         grown = float(slope + credit < 0.0)
         value = min(slope + credit, 0.0)
         return SimpleNamespace(solved=solved, value=value, descent=-value, d=np.array([grown]))
@@ -21,7 +22,7 @@ def lpec(slope, solved=True):
 
 
 def unchanged(slope):
-    return lambda: (lpec(slope)(0.0), 0)
+    return lambda: [charge(lpec(slope)([0.0]), 0, 1e-6)]
 
 
 @pytest.mark.parametrize(
@@ -43,7 +44,7 @@ def test_descent_of_a_part_that_changes_nothing_does_not_count(slope, verdict):
 
 
 def test_where_nothing_is_known_of_an_unchanged_part_all_descent_counts():
-    assert of_growth(lpec(-1e-3), lambda: (None, 0), 1e-6) is Verdict.DESCENT
+    assert of_growth(lpec(-1e-3), lambda: [charge(None, 0, 1e-6)], 1e-6) is Verdict.DESCENT
 
 
 def test_without_an_lpec_nothing_is_decided():
