@@ -3,7 +3,7 @@
 The best point so far is ``Run.point``: an exactly complementary solution of its branch NLP with the certificate of the LPEC.
 """
 
-from collections import Counter
+from collections import Counter, deque
 
 import numpy as np
 
@@ -104,17 +104,45 @@ class Branches:
         return certificate.certified
 
     def try_neighbours(self):
-        """Solve the neighbouring branches of the incumbent, and those of each better point found."""
-        neighbours = list(self._c.neighbours)
-        while neighbours:
-            point, neighbour = self.run.point, neighbours.pop(0)
-            zero = self.zero_sides(point, neighbour)
-            if zero is not None and not self.tried(zero):
-                start = point.w.copy()
-                start[neighbour.starts] = neighbour.at
-                self._widen_from(self.improve_from(self._point(start, zero, None, True, below=point.f), False))
-                if self.run.point.f < point.f - PROGRESS * max(1.0, abs(point.f)):
-                    neighbours = list(self._c.neighbours)
+        """Solve the neighbouring branches of the incumbent, and those of each better point found, until none of them is better."""
+        self._try_without_all_short()
+        neighbours = deque(self._c.neighbours)
+        left = len(neighbours)
+        while left:
+            point, neighbour = self.run.point, neighbours[0]
+            neighbours.rotate(-1)
+            left -= 1
+            self._try_neighbour(point, neighbour)
+            if self._is_progress(point):
+                left = len(neighbours)
+
+    def _try_without_all_short(self):
+        """Solve the branches without any of the variables at their lower bound: one by one each would gain next to nothing."""
+        while True:
+            point = self.run.point
+            short = [neighbour for neighbour in self._c.neighbours if neighbour.short.size and self._is_short(point, neighbour)]
+            # a place of least extent takes over what one of the two beside it holds
+            by_first = {neighbour.short.tobytes(): neighbour for neighbour in reversed(short)}
+            by_last = {neighbour.short.tobytes(): neighbour for neighbour in short}
+            if len(by_last) > 1:
+                for some in (reversed(by_first.values()), reversed(by_last.values())):
+                    self._try_neighbour(point, *some)
+            if not self._is_progress(point):
+                return
+
+    def _try_neighbour(self, point, *neighbours):
+        """Solve the branch of neighbours of a point, one after the other, unless it was tried, and go on from there."""
+        zero = self.zero_sides(point, *neighbours)
+        if zero is None or self.tried(zero):
+            return
+        start = point.w.copy()
+        for neighbour in neighbours:
+            start[neighbour.starts] = neighbour.at
+        self._widen_from(self.improve_from(self._point(start, zero, None, True, below=point.f), False))
+
+    def _is_progress(self, before):
+        """Whether the incumbent is better than a point ``before``."""
+        return self.run.point.f < before.f - PROGRESS * max(1.0, abs(before.f))
 
     def without_short(self, point):
         """A better point in a neighbouring branch for a variable of ``point`` at its lower bound; None if there is none.
@@ -151,17 +179,23 @@ class Branches:
         zero = self._subsolves.sets(point.w, self._tolerances.biactive).zero
         self.improve_from(self.solutions.certified(point.w, zero, max_iter=SECOND), True)
 
-    def zero_sides(self, point, neighbour, always=False):
-        """The zero sides of a neighbouring branch of ``point``; None if it need not be tried."""
-        at_bound = np.any(point.w[neighbour.short] <= self._c.lbx[neighbour.short] + AT_BOUND)
-        if neighbour.short.size and not at_bound and not always:
+    def zero_sides(self, point, *neighbours, always=False):
+        """The zero sides of neighbouring branches of ``point``, one after the other; None if they need not be tried."""
+        if not (always or all(self._is_short(point, neighbour) for neighbour in neighbours)):
             return None
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)
         zero = sets.zero.copy()
-        zero[neighbour.ended] = G_ZERO
-        zero[neighbour.targets] = sets.zero[neighbour.sources]
+        for neighbour in neighbours:
+            taken = zero[neighbour.sources]
+            zero[neighbour.ended] = G_ZERO
+            zero[neighbour.targets] = taken
         # the point lies on both sides of a bi-active pair already
         return zero if np.any((zero != sets.zero) & ~sets.gamma) else None
+
+    def _is_short(self, point, neighbour):
+        """Whether a neighbouring branch is one of this point: a variable is at its lower bound, if it asks for that."""
+        short = neighbour.short
+        return not short.size or bool(np.any(point.w[short] <= self._c.lbx[short] + AT_BOUND))
 
     def search(self, *starts):
         """Search for any feasible branch: by the LPEC with every pair as a binary, then depth first over the pairs."""

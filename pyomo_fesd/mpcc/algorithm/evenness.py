@@ -15,6 +15,8 @@ from pyomo_fesd.mpcc.algorithm.branches import AT_BOUND, PROGRESS, is_below
 
 #: A point is more even than another if its deviations are smaller by this part.
 EVENER = 1e-3
+#: NLP iterations in search of more even points: this part of those before, and at least so many.
+SHARE, LEAST = 0.1, 300
 
 
 class Evenness:
@@ -41,9 +43,11 @@ class Evenness:
         if evened is not None:
             self.run.point = evened
             return
+        before = self.run.counts.iterations
+        most = before + max(SHARE * before, LEAST)
         while point is not None:
             self.run.point = point
-            point = self._neighbour(point, tried)
+            point = self._neighbour(point, tried, most)
 
     def _is_uneven(self, w):
         c = self._c
@@ -57,14 +61,19 @@ class Evenness:
         self._subsolves.note("shared evenly", start)
         return self._if_more_even(start, self._subsolves.sets(start, self._tolerances.biactive).zero, point, np.inf)
 
-    def _neighbour(self, point, tried):
-        """A certified solution of a neighbouring branch that is more even; small variables are the first to change sides."""
+    def _neighbour(self, point, tried, most):
+        """A certified solution of a neighbouring branch that is more even, unless the run has had ``most`` iterations before.
+
+        Small variables are the first to change sides.
+        """
         candidates = [n for n in self._c.neighbours if n.short.size]
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for neighbour in sorted(candidates, key=lambda n: point.w[n.short].max()):
             zero = self._branches.zero_sides(point, neighbour, always=True)
             if zero is None or zero.tobytes() in tried:
                 continue
+            if self.run.counts.iterations >= most:
+                return None
             tried.add(zero.tobytes())
             found = self._if_more_even(point.w, zero, point, enough)
             if found is not None:
@@ -78,7 +87,7 @@ class Evenness:
         from a solution that is not above ``worth``.
         """
         size = max(1.0, abs(point.f))
-        found = self._branches.solutions.certified(start, zero, max_iter=SECOND)
+        found = self._branches.solutions.certified(start, zero, max_iter=SECOND, below=point.f)
         if not is_below(found, point.f + AS_GOOD * size):
             return None
         found = self._descended(found) if found.f <= worth else found

@@ -14,7 +14,7 @@ STEP = 1e-6
 
 
 def joined(short, copies):
-    """Matrix and cost of the joined LPEC at a random point; ``copies``, each a part and whether ahead of it, have random values too."""
+    """Matrix and cost of the joined LPEC at a random point, also in the ``copies``: each a part, and whether ahead of it."""
     c, parts, w = short.c, short.parts, short.w
     sides = np.random.default_rng(1).integers(0, 2, c.pairs)
     sets, equal = ActiveSets(sides, np.zeros(c.pairs, dtype=bool)), np.zeros(c.equal.numel(), dtype=bool)
