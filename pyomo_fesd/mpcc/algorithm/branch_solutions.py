@@ -25,9 +25,23 @@ class BranchSolutions:
 
     def __init__(self, subsolves):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
+        self._known = {}
 
     def certified(self, w, zero, duals=None, below=np.inf, **more):
-        """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one."""
+        """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
+
+        From the same values the same branch is solved once: neighbours of points that hardly differ lead to it again and again.
+        """
+        if duals is not None or 'box' in more:
+            return self._certified(w, zero, duals, below, **more)
+        key = hash((w.tobytes(), zero.tobytes(), self._c.lbx.tobytes(), self._c.ubx.tobytes(), *sorted(more.items())))
+        found, least = self._known.get(key, (None, -np.inf))
+        if found is None and below > least:
+            found = self._certified(w, zero, duals, below, **more)
+            self._known[key] = found, below
+        return None if found is None or _is_clearly_above(found.f, below) else found
+
+    def _certified(self, w, zero, duals, below, **more):
         solved, equal = self._solve(w, zero, duals, below, **more)
         if solved is not None and not solved.solved and more.get('max_iter') in MORE:
             # feasible, so the branch has a solution, but not at its minimum yet

@@ -76,9 +76,10 @@ class Branches:
         """
         point = self._point(relaxed.w, sets.zero, relaxed, final)
         if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
-            # undecided sides may be written in several ways
-            zero = self._subsolves.settled(relaxed.w, self._subsolves.suggestion(relaxed.w, sets, self._tolerances.radius).zero)
-            point = self._point(relaxed.w, zero, relaxed, final)
+            step = self._subsolves.suggestion(relaxed.w, sets, self._tolerances.radius)
+            if step.solved:
+                # undecided sides may be written in several ways
+                point = self._point(relaxed.w, self._subsolves.settled(relaxed.w, step.zero), relaxed, final)
         # with the global LPEC search for better branches now: this point is not revisited
         self.improve_from(point, final or self._global_lpec)
         return self._solved.get(sets.zero.tobytes())

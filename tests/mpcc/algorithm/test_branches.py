@@ -102,13 +102,16 @@ def test_where_the_step_overshoots_the_trust_region_shrinks():
     assert p.run.point.w == pytest.approx(p.point(x=0.5, y=0.0), abs=1e-6)
 
 
-def test_a_solved_branch_is_not_solved_again():
+def test_a_solved_branch_is_not_solved_again_from_the_same_values():
     p = at_point(two_minima(), False)
     assert len(p.kinds('branch')) == 1
     p.branches.explore_from(p.compiled.x0, False)
     assert len(p.kinds('branch')) == 1
     p.branches.forget()
     p.branches.explore_from(p.compiled.x0, False)
+    assert len(p.kinds('branch')) == 1
+    p.branches.forget()
+    p.branches.explore_from(p.compiled.x0 + 1e-3, False)
     assert len(p.kinds('branch')) == 2
 
 
