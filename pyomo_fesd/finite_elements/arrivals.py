@@ -9,7 +9,7 @@ the elements can grow with descent decides whether the solution is one.
 Takes: the pairs of the moving grid, and which conditions switch together.
 Leaves: an ``Arrival`` for each system and end in the block's ``HomotopyHints``; ``mpec_hybrid`` looks at it before it certifies.
 Does not apply: to conditions neither side of which is known to be continuous; to state jumps at the first time and to hysteresis
-and jumps that are touched, as the trajectories with them are others.
+and jumps that are touched, as the trajectories with them are others; to impacts of bodies that must not slip.
 """
 
 from collections import defaultdict
@@ -50,10 +50,12 @@ def add_arrivals(moving: MovingGrid) -> None:
     places, arrivals, families = PairsByPlace(moving), homotopy_hints(moving.block).arrivals, _families(moving)
     elements, pairs = moving.grid.elements, _pairs_of_elements(moving)
     for end in (_End(TO_FIRST, elements[0], 0), _End(TO_LAST, elements[-1], len(elements))):
-        row = _row(moving, places, end)
-        arrivals += [Arrival(row, toggles) for toggles in _toggles(families, pairs, end) if toggles]
+        row, contacts = _row(moving, places, end), _contacts(moving, end)
+        # a contact that closes without a velocity has an impact without an impulse
+        others = [family for family in families if not all(condition.name in contacts for condition in family)]
+        arrivals += [Arrival(row, toggles) for toggles in _toggles(others, pairs, end) if toggles]
         if len(elements) > 1:
-            options = [*_by_hysteresis(moving, end), *_by_jumps(moving, end)]
+            options = [*_by_hysteresis(moving, end), *_by_jumps(moving, end), *_by_impacts(moving, pairs, contacts, end)]
             arrivals += [Arrival(row, options=some) for some in options if some]
     for before, after in zip(elements, elements[1:]):
         if after.opens_stage:
@@ -191,3 +193,42 @@ def _by_jumps(moving, end) -> Iterator[tuple]:
         index = law.name, end.inner
         sides = ((jumps.happens[index], SECOND_SIDE), (jumps.binary[index], SECOND_SIDE))
         yield (Option(gauges=(law.guards[end.label],), requires=(), sides=sides),)
+
+
+# rigid contacts
+
+
+def _condition_of(moving, law, end):
+    """The condition of a contact at an end; None where it has none."""
+    touching = law.touching.get(end.label)
+    found = (c for c in moving.complementarities if touching is not None and c.conditions.get(end.label) is touching)
+    return next(found, None) if end.label in law.gaps else None
+
+
+def _contacts(moving, end):
+    """The contacts that may close at an end with an impact, by the names of their conditions: those at the last time."""
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    if impacts is None or end.step is TO_FIRST or len(moving.grid.elements) == 1:
+        return {}
+    conditions = ((_condition_of(moving, law, end), law) for law in impacts.laws if not law.sticking)
+    return {condition.name: law for condition, law in conditions if condition is not None}
+
+
+def _by_impacts(moving, pairs, contacts, end) -> Iterator[tuple]:
+    """For each contact the impacts at an end, after which the bodies part or stay together."""
+    for name, law in contacts.items():
+        yield tuple(_impacts(moving.state_jumps.impacts, law, (name, pairs), end))
+
+
+def _impacts(impacts, law, of_condition, end):
+    name, pairs = of_condition
+    at_boundary = {index: pair for index, pair in impacts.impact.items() if index[1] == end.inner}
+    impact = [(pair, SECOND_SIDE) for index, pair in at_boundary.items() if index[0] == law.name]
+    # an impact may go on through closed contacts, and change what slips
+    either = [pair for index, pair in at_boundary.items() if index[0] != law.name]
+    either += [pair for (_, b), pair in impacts.slip.items() if b == end.inner]
+    if len(impacts.slip):
+        either += [pair for (other, n), some in pairs.items() if n == end.element.n and other != name for pair in some]
+    apart, together = (tuple((pair, side) for pair in pairs[name, end.element.n]) for side in (FIRST_SIDE, SECOND_SIDE))
+    for after in (apart, together):
+        yield Option(gauges=(law.gaps[end.label],), requires=apart, sides=(*impact, *after), either=tuple(either))

@@ -54,6 +54,8 @@ class ChangedEnd:
     extent, inner : int
         those of the place and of the one beside it
     zero : int array (q)
+    changed, either : int arrays
+        the pairs that change, and those of which any side may be zero then
     targets, sources : int arrays
         pairs of the place beside it, and those of the place that mean the same
     """
@@ -61,6 +63,8 @@ class ChangedEnd:
     extent: int
     inner: int
     zero: np.ndarray
+    changed: np.ndarray
+    either: np.ndarray
     targets: np.ndarray
     sources: np.ndarray
 
@@ -178,12 +182,12 @@ def _entered(rows, sequence, sets, w):
 def _changed_end(rows, sequence, sets):
     """The place at an end with its change; None with more changes than one, at an end between two rows, and without places."""
     (row, *others), (change, *more) = rows, sequence
-    if others or more or len(row) < 2 or change.either.size or None in (row[0].extent, row[1].extent):
+    if others or more or len(row) < 2 or None in (row[0].extent, row[1].extent):
         return None
     zero = sets.zero.copy()
     zero[change.pairs] = change.sides
     targets, sources = (np.concatenate(both) for both in zip(*((m.targets, m.sources) for m in (row[1].inside, row[1].between))))
-    return ChangedEnd(row[0].extent, row[1].extent, zero, targets, sources)
+    return ChangedEnd(row[0].extent, row[1].extent, zero, change.pairs, change.either, targets, sources)
 
 
 def _moved_inwards(row, zero, start, undecided):

@@ -9,12 +9,16 @@ Leaves: the ``Verdict`` of each order.
 Does not apply: to models without parts.
 """
 
+from itertools import product
+
 import numpy as np
 
-from pyomo_fesd.mpcc.subproblems import G_ZERO, EndInsertion, Insertion, Verdict
+from pyomo_fesd.mpcc.subproblems import G_ZERO, H_ZERO, EndInsertion, Insertion, Verdict, of_orders
 
 #: Whether a copy lies before the part beside an end between two rows: that on the near side of it, and that on the far side.
 SIDES = False, True
+#: Of more pairs that may have either side not all combinations are judged.
+FEW = 4
 #: The side of the boundary on which a copy lies.
 BEFORE, AFTER = 0, 1
 
@@ -72,8 +76,26 @@ class OrdersByInsertion:
         end, inner = (self._parts.by_extent.get(extent) for extent in (changed.extent, changed.inner))
         if end is None or inner is None or inner not in self._parts.beside(end):
             return Verdict.NONE
+        if self._parts.all[end].gate.size:
+            return self._behind_last(changed, end, inner) if self._parts.next(end) is None else Verdict.NONE
+        if changed.either.size:
+            return Verdict.NONE
         order = EndInsertion(end, inner, changed.zero, changed.targets, changed.sources)
         return self._subsolves.insertion_at_end(self._point, self._sets, order)
+
+    def _behind_last(self, changed, end, inner):
+        """The verdict of copies behind the last part that begin with what changes at the end, for all sides that may be either."""
+        if len(changed.either) > FEW:
+            return Verdict.NONE
+        is_gate = self._parts.in_gate & (self._parts.of_pair == end)
+        unchanged, zero = (np.where(is_gate, G_ZERO, sides) for sides in (self._sets.zero, changed.zero))
+        zero[changed.changed] = changed.zero[changed.changed]
+        verdicts, alone = [], Insertion(end, False, unchanged, self._sets.zero, (end, inner))
+        for sides in product((G_ZERO, H_ZERO), repeat=len(changed.either)):
+            zero[changed.either] = sides
+            order = Insertion(end, False, zero.copy(), self._sets.zero, (end, inner))
+            verdicts.append(self._subsolves.insertion(self._point, self._sets, (order,), (alone,)))
+        return of_orders(verdicts)
 
     def _row(self, numbers, coincidence, places, present) -> tuple:
         """The insertions of places in a row; ``numbers`` are those of the parts on both sides of the boundary."""

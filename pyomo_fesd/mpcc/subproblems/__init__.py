@@ -21,4 +21,4 @@ from pyomo_fesd.mpcc.subproblems.restoration import Restoration
 from pyomo_fesd.mpcc.subproblems.side_constraints import settle, sort_sides, without_constant
 from pyomo_fesd.mpcc.subproblems.solver_cache import SolverCache
 from pyomo_fesd.mpcc.subproblems.stationarity import Certificate, Stationarity, certify_point, measure
-from pyomo_fesd.mpcc.subproblems.verdict import Verdict
+from pyomo_fesd.mpcc.subproblems.verdict import Verdict, of_orders

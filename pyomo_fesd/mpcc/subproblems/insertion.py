@@ -26,6 +26,9 @@ from pyomo_fesd.mpcc.subproblems.inserted_part import InsertedPart
 from pyomo_fesd.mpcc.subproblems.joined_lpec import JoinedLpec, linearised_at_both
 from pyomo_fesd.mpcc.subproblems.verdict import Verdict, charge, of_all, of_growth
 
+#: The number of the part after the last one, which has no rows, no pairs and no variables.
+AFTER_LAST = -3
+
 
 class Insertions:
     """Judges the insertions into one compiled MPCC.
@@ -111,8 +114,7 @@ class Insertions:
         k, part = insertion.k, self._parts.all[insertion.k]
         # the copy of a part whose first values are given begins with them
         begins = part.whole or (part.alike and insertion.ahead and not grows)
-        goes_on = not grows or self._following(insertion) is not None
-        return begins and goes_on and not (self._parts.ends_with_pairs(k) or self._parts.is_beside_a_short_one(w, k))
+        return begins and not (self._parts.ends_with_pairs(k) or self._parts.is_beside_a_short_one(w, k))
 
     @staticmethod
     def _by_values(w, insertion, copy, guess):
@@ -133,12 +135,15 @@ class Insertions:
         return Copy(self._parts.of_copies, self._sides, self._parts, insertion, is_first)
 
     def _following(self, insertion):
-        """The part after the copy."""
-        return insertion.k if insertion.ahead else self._parts.next(insertion.k)
+        """The part after the copy; AFTER_LAST without one."""
+        following = insertion.k if insertion.ahead else self._parts.next(insertion.k)
+        return AFTER_LAST if following is None else following
 
     def _beside(self, w, present, insertion, copy):
         """The point in which the part after the copy begins with its last values; None if its beginning is not determined."""
         following = self._following(insertion)
+        if following == AFTER_LAST:
+            return w
         first, gate = self._parts.all[following].first, self._parts.all[following].gate
         w = w.copy()
         w[first] = copy.limit[copy.part.last if insertion.ahead else first]

@@ -50,3 +50,11 @@ def of_all(verdicts) -> Verdict:
         if worst in verdicts:
             return worst
     return Verdict.NO_DESCENT
+
+
+def of_orders(verdicts) -> Verdict:
+    """The verdict of several orders together: where one of them may descend, or is not decided, all may."""
+    for worst in (Verdict.NONE, Verdict.DESCENT, Verdict.UNKNOWN, Verdict.NO_DESCENT):
+        if worst in verdicts:
+            return worst
+    return Verdict.IMPOSSIBLE
