@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import ceil
 
 from pyomo.common.dependencies import pandas as pd
@@ -202,5 +201,5 @@ def _intervals(grid, numbers) -> Iterator[_Interval]:
 def _expressions_differ(model, times, places):
     """Whether a named expression, which no equation need contain, has other numbers in other elements."""
     named = times.families(own_data(model, Expression, Block)).values()
-    at_points = ([partial(some.__getitem__, place.points[0]) for place in places if place.points[0] in some] for some in named)
+    at_points = ([(some[place.points[0]],) for place in places if place.points[0] in some] for some in named)
     return any(len(expressions) > 1 and differ(expressions) for expressions in at_points)
