@@ -20,7 +20,7 @@ from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint
 from pyomo.gdp import Disjunct, Disjunction
 
-from pyomo_fesd.core import FesdError
+from pyomo_fesd.core import FesdError, data_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,15 +75,11 @@ class DisjunctionTree:
 
 def active_constraints(disjunct) -> list:
     """Return the active constraints of a disjunct and of the Blocks in it."""
-    found = []
-    for component in disjunct.component_map().values():
-        ctype = component.ctype
-        if ctype is Block:
-            return list(disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
-        if ctype is Constraint and component.active:
-            found += [data for data in component.values() if data.active]
+    if Block in disjunct._ctypes:
+        return list(disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
     # most disjuncts hold a few Constraints, and there is one at every time: Pyomo's walk takes longer than all the rest
-    return found
+    components = disjunct.component_map(Constraint, active=True).values()
+    return [data for component in components for data in data_of(component) if data.active]
 
 
 def enclosing_disjunct(component):
