@@ -15,6 +15,7 @@ from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core.generated import is_generated
 from pyomo_fesd.core.interruption import DeferredInterrupt
+from pyomo_fesd.core.own_data import own_data
 from pyomo_fesd.core.private_data import remember_records
 
 PLACES = (Block, Disjunct)
@@ -66,7 +67,7 @@ def _remembered(model, wrt):
 
 
 def _remember_values(model) -> Callable[[], None]:
-    found = (v for ctype in VARIABLES for v in model.component_data_objects(ctype, descend_into=PLACES))
+    found = (v for ctype in VARIABLES for v in own_data(model, ctype, PLACES))
     variables = [(v, v.value, v.stale, v.fixed) for v in found]
     params = (p for p in model.component_objects(Param, descend_into=PLACES) if p.mutable)
     params = [(data, data._value) for p in params for data in p._data.values()]
@@ -87,9 +88,7 @@ def _remember_values(model) -> Callable[[], None]:
 def _remember_statements(model):
     """What Constraints, Objectives, named Expressions and Complementarities state."""
     stated = [
-        (data, getattr(data, attribute, None))
-        for ctype, attribute in STATEMENTS.items()
-        for data in model.component_data_objects(ctype, descend_into=PLACES)
+        (data, getattr(data, attribute, None)) for ctype, attribute in STATEMENTS.items() for data in own_data(model, ctype, PLACES)
     ]
 
     def restore():

@@ -2,8 +2,10 @@
 
 import logging
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from math import isfinite
+from operator import itemgetter
 
 from pyomo.core import Block, Constraint, value
 from pyomo.core.expr.relational_expr import RelationalExpression
@@ -51,13 +53,13 @@ def warn_explicit_time(moving: MovingGrid, expressions: Iterable[tuple]) -> None
 def _depends_on_time(by_time, stage):
     """Whether points of one control stage differ."""
     points = _spread([t for t in by_time if t in stage])
-    return any(differ([by_time[t] for t in points if stage[t] == s]) for s in {stage[t] for t in points})
+    return any(differ([by_time[t]() for t in points if stage[t] == s]) for s in {stage[t] for t in points})
 
 
 def expressions_over_time(
     block: Block, moving: MovingGrid, integrands: list[Integrand], laws: Iterable[tuple]
-) -> list[tuple[str, dict[float, Sequence]]]:
-    """Return ``(name, {label: expressions and relations})`` of all components over time that a user's rule made.
+) -> list[tuple[str, dict[float, Callable]]]:
+    """Return ``(name, {label: function that gives expressions and relations})`` of all components over time that a rule made.
 
     Parameters
     ----------
@@ -65,12 +67,15 @@ def expressions_over_time(
         guards and resets of state jumps, conditions of modes with hysteresis
     """
     components = block.component_objects((Constraint, Complementarity), active=True, descend_into=Block)
-    datas = (d for c in components if not is_discretisation_equation(c) for d in c.values() if d.active)
-    by_name = TimeIndex(moving.wrt).families(datas)
-    found = [(name, {t: _stated(d) for t, d in by_time.items()}) for name, by_time in by_name.items()]
+    by_name = TimeIndex(moving.wrt).families_in(c for c in components if not is_discretisation_equation(c))
+    active = ((name, {t: partial(_stated, d) for t, d in by_time.items() if d.active}) for name, by_time in by_name.items())
     points = _spread([t for e in moving.grid.elements for t in e.points])
-    found += [(i.name, {t: (i.at(t),) for t in points}) for i in integrands]
-    return found + list(laws)
+    found = [*filter(itemgetter(1), active), *((i.name, {t: partial(_alone, i, t) for t in points}) for i in integrands)]
+    return found + [(name, {t: partial(tuple, parts) for t, parts in by_time.items()}) for name, by_time in laws]
+
+
+def _alone(integrand, t):
+    return (integrand.at(t),)
 
 
 def _stated(data):

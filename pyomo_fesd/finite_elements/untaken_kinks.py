@@ -8,7 +8,7 @@ Does not apply: to arguments whose sign the bounds decide, or that do not vary.
 """
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from pyomo.common.numeric_types import native_numeric_types
 from pyomo.core.expr import numeric_expr as ne
@@ -27,11 +27,11 @@ STEPS = "a Disjunction with one region for each value"
 STEP = "a Disjunction with the two sides of the step"
 
 
-def warn_untaken_kinks(expressions: Iterable[tuple[str, Mapping[float, Sequence]]]) -> None:
-    """Warn of the kinks in ``(name, {time: expressions and relations})``."""
+def warn_untaken_kinks(expressions: Iterable[tuple[str, Mapping[float, Callable]]]) -> None:
+    """Warn of the kinks in ``(name, {time: function that gives expressions and relations})``."""
     found = {}
     for name, by_time in expressions:
-        for function, remedy in _kinks(next(reversed(by_time.values()))):
+        for function, remedy in _kinks(next(reversed(by_time.values()))()):
             found.setdefault((strip_time(name), function), remedy)
     if found:
         shown = [f"{name} ({function}: {remedy})" for (name, function), remedy in found.items()]
