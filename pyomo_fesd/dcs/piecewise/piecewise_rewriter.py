@@ -179,7 +179,7 @@ def _is_ours(component):
 def _contains(source, wrt):
     """Whether a component contains a piecewise function."""
     sides = _complementarity_sides(source) if source.ctype is Complementarity else (source.expr,)
-    return any([contains_node(side, NODES, enter=lambda named: not _waits(named, wrt)) for side in sides])
+    return any(contains_node(side, NODES, enter=lambda named: not _waits(named, wrt)) for side in sides)
 
 
 def _complementarity_sides(condition):

@@ -20,7 +20,7 @@ from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint
 from pyomo.gdp import Disjunct, Disjunction
 
-from pyomo_fesd.core import FesdError, data_of
+from pyomo_fesd.core import FesdError, data_of, own_data
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,8 @@ class Nesting:
     def __init__(self, model, times, with_hysteresis=()):
         self._times, self._with_hysteresis = times, with_hysteresis
         self._inside, self._hosts = ComponentMap(), ComponentMap()
-        for disjunction in model.component_data_objects(Disjunction, active=True, descend_into=(Block, Disjunct)):
+        found = own_data(model, Disjunction, (Block, Disjunct), active=True)
+        for disjunction in (d for d in found if d.active):
             host = self._hosts[disjunction] = self._host(disjunction)
             if host is not None:
                 self._inside.setdefault(host, []).append(disjunction)
