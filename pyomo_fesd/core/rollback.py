@@ -23,6 +23,8 @@ PLACES = (Block, Disjunct)
 VARIABLES = (BooleanVar, DerivativeVar, Var)
 #: Attributes that hold what a component states, by its type.
 STATEMENTS = {Constraint: 'expr', Objective: 'expr', Expression: 'expr', Complementarity: '_args'}
+#: Ids of the models that are restored after the present step in any case.
+_RESTORED = set()
 
 
 @contextmanager
@@ -30,13 +32,16 @@ def restored_on_error(block: Block, wrt: ContinuousSet | None = None) -> Iterato
     """Remove points, indices, components, types and records that the body added to the model, if it raises.
 
     Values, what is fixed, what is active and what components state are as before, too.  The error may be any: the body calls the
-    rules of the user's model, and Ctrl-C is one too.  It waits while the model is restored.
+    rules of the user's model, and Ctrl-C is one too.  It waits while the model is restored.  Within ``restored`` that does it.
 
     Parameters
     ----------
     wrt : ContinuousSet, optional
         to which the body may add points
     """
+    if id(block.model()) in _RESTORED:
+        yield
+        return
     with DeferredInterrupt() as interrupt, _remembered(block.model(), wrt) as undo:
         with interrupt.raising():
             yield
@@ -45,9 +50,16 @@ def restored_on_error(block: Block, wrt: ContinuousSet | None = None) -> Iterato
 
 @contextmanager
 def restored(block: Block, wrt: ContinuousSet | None = None) -> Iterator[None]:
-    """Restore the model after the body, whether it raises or not; see ``restored_on_error``."""
-    with DeferredInterrupt() as interrupt, _remembered(block.model(), wrt), interrupt.raising():
-        yield
+    """Restore the model after the body, whether it raises or not; see ``restored_on_error``.
+
+    The body may add points to ``wrt`` only, and catches no error of a step that restores the model itself: such a step leaves that
+    to this context, which has remembered the model already.
+    """
+    with DeferredInterrupt() as interrupt, _remembered(block.model(), wrt) as undo:
+        _RESTORED.add(id(block.model()))
+        undo.callback(_RESTORED.discard, id(block.model()))
+        with interrupt.raising():
+            yield
 
 
 def _remembered(model, wrt):
