@@ -55,7 +55,7 @@ from pyomo_fesd.core.interpolation import interpolation_weights
 from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible
 from pyomo_fesd.core.keywords import check_keywords, read_keywords
 from pyomo_fesd.core.moving_grid import MovingGrid, Split, add_moving_grid, moving_grids
-from pyomo_fesd.core.node_search import contains_node
+from pyomo_fesd.core.node_search import contains_node, leaves_of
 from pyomo_fesd.core.own_data import data_of, own_components, own_data, variables_below
 from pyomo_fesd.core.parts import Part
 from pyomo_fesd.core.phase import phase

@@ -71,7 +71,8 @@ def _finite(bound):
     """``bound``, or None if it is infinite."""
     if bound is None or not _is_constant(bound):
         return bound
-    return None if abs(value_or_nan(bound)) == inf else bound
+    number = bound if bound.__class__ in native_numeric_types else value_or_nan(bound)
+    return None if abs(number) == inf else bound
 
 
 def read_side(arg) -> Side:

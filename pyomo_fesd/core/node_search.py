@@ -1,11 +1,13 @@
-"""Ask whether an expression contains a node of some classes, quicker than a visitor of Pyomo can.
+"""Search the nodes of an expression, quicker than a visitor of Pyomo can.
 
-Takes: an expression, and classes of nodes.
+Takes: an expression; classes of nodes.
 Leaves: nothing.
 """
 
+from collections.abc import Iterator
 from functools import cache
 
+from pyomo.common.numeric_types import native_types
 from pyomo.core.base.expression import NamedExpressionData
 from pyomo.core.expr.base import ExpressionBase
 
@@ -31,6 +33,19 @@ def contains_node(expr, sought: frozenset, enter=None) -> bool:
         if sort is _OPERATION or (sort is _NAMED and enter(node)):
             waiting.extend(node.args)
     return False
+
+
+def leaves_of(expr) -> Iterator:
+    """Yield the variables, Params and units in ``expr``, as often as they occur."""
+    waiting = [expr]
+    while waiting:
+        node = waiting.pop()
+        if node.__class__ in native_types:
+            continue
+        if node.is_expression_type():
+            waiting.extend(node.args)
+        else:
+            yield node
 
 
 @cache

@@ -15,6 +15,7 @@ from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core.generated import is_generated
 from pyomo_fesd.core.interruption import DeferredInterrupt
+from pyomo_fesd.core.own_data import own_data
 from pyomo_fesd.core.private_data import remember_records
 
 PLACES = (Block, Disjunct)
@@ -22,6 +23,8 @@ PLACES = (Block, Disjunct)
 VARIABLES = (BooleanVar, DerivativeVar, Var)
 #: Attributes that hold what a component states, by its type.
 STATEMENTS = {Constraint: 'expr', Objective: 'expr', Expression: 'expr', Complementarity: '_args'}
+#: Ids of the models that are restored after the present step in any case.
+_RESTORED = set()
 
 
 @contextmanager
@@ -29,13 +32,16 @@ def restored_on_error(block: Block, wrt: ContinuousSet | None = None) -> Iterato
     """Remove points, indices, components, types and records that the body added to the model, if it raises.
 
     Values, what is fixed, what is active and what components state are as before, too.  The error may be any: the body calls the
-    rules of the user's model, and Ctrl-C is one too.  It waits while the model is restored.
+    rules of the user's model, and Ctrl-C is one too.  It waits while the model is restored.  Within ``restored`` that does it.
 
     Parameters
     ----------
     wrt : ContinuousSet, optional
         to which the body may add points
     """
+    if id(block.model()) in _RESTORED:
+        yield
+        return
     with DeferredInterrupt() as interrupt, _remembered(block.model(), wrt) as undo:
         with interrupt.raising():
             yield
@@ -44,9 +50,16 @@ def restored_on_error(block: Block, wrt: ContinuousSet | None = None) -> Iterato
 
 @contextmanager
 def restored(block: Block, wrt: ContinuousSet | None = None) -> Iterator[None]:
-    """Restore the model after the body, whether it raises or not; see ``restored_on_error``."""
-    with DeferredInterrupt() as interrupt, _remembered(block.model(), wrt), interrupt.raising():
-        yield
+    """Restore the model after the body, whether it raises or not; see ``restored_on_error``.
+
+    The body may add points to ``wrt`` only, and catches no error of a step that restores the model itself: such a step leaves that
+    to this context, which has remembered the model already.
+    """
+    with DeferredInterrupt() as interrupt, _remembered(block.model(), wrt) as undo:
+        _RESTORED.add(id(block.model()))
+        undo.callback(_RESTORED.discard, id(block.model()))
+        with interrupt.raising():
+            yield
 
 
 def _remembered(model, wrt):
@@ -66,7 +79,7 @@ def _remembered(model, wrt):
 
 
 def _remember_values(model) -> Callable[[], None]:
-    found = (v for ctype in VARIABLES for v in model.component_data_objects(ctype, descend_into=PLACES))
+    found = (v for ctype in VARIABLES for v in own_data(model, ctype, PLACES))
     variables = [(v, v.value, v.stale, v.fixed) for v in found]
     params = (p for p in model.component_objects(Param, descend_into=PLACES) if p.mutable)
     params = [(data, data._value) for p in params for data in p._data.values()]
@@ -87,9 +100,7 @@ def _remember_values(model) -> Callable[[], None]:
 def _remember_statements(model):
     """What Constraints, Objectives, named Expressions and Complementarities state."""
     stated = [
-        (data, getattr(data, attribute, None))
-        for ctype, attribute in STATEMENTS.items()
-        for data in model.component_data_objects(ctype, descend_into=PLACES)
+        (data, getattr(data, attribute, None)) for ctype, attribute in STATEMENTS.items() for data in own_data(model, ctype, PLACES)
     ]
 
     def restore():

@@ -156,11 +156,14 @@ class TimeIndex:
     def families_in(self, components) -> dict:
         """Group the data of whole ``components`` as ``families`` does, in less time where they are over time themselves."""
         groups = defaultdict(dict)
-        for component in components:
+        # an index set without members has no dimension, and so no place for the time
+        for component in filter(len, components):
             _, outer, _, _, position = self._place(component)
             if position is None or outer is not None:
-                for name, by_time in self.families(data_of(component)).items():
-                    groups[name].update(by_time)
+                for data in data_of(component):
+                    time, name = self.split(data)
+                    if time is not None:
+                        groups[name][time] = data
                 continue
             by_rest = {}
             for index, data in component.items():

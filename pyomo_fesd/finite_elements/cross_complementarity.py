@@ -14,7 +14,7 @@ from pyomo.core import Constraint, ConstraintList, RangeSet, Set, quicksum
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import Follower, MovingGrid, all_switched_systems, homotopy_hints, is_generated, mutable_parameters
+from pyomo_fesd.core import Follower, MovingGrid, all_switched_systems, homotopy_hints, is_generated, leaves_of
 from pyomo_fesd.finite_elements.mixed_complementarity import repeats_other_side
 from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
 
@@ -109,7 +109,7 @@ def _never_negative(expr, bounds):
     """Whether the bounds of the variables imply expr >= 0 for all values of mutable Params."""
     if expr.is_variable_type():
         return not _bound_may_change(expr) and expr.lb is not None and expr.lb >= 0
-    if any(True for _ in mutable_parameters(expr)) or any(map(_bound_may_change, identify_variables(expr))):
+    if any(leaf.is_parameter_type() or (leaf.is_variable_type() and _bound_may_change(leaf)) for leaf in leaves_of(expr)):
         return False
     low, _ = bounds.walk_expression(expr)
     return low is not None and low >= 0

@@ -37,6 +37,7 @@ from pyomo_fesd.core import (
     is_generated,
     is_indexed_by,
     label_decimals,
+    own_components,
     restored_on_error,
     withheld_messages,
 )
@@ -95,7 +96,7 @@ def discretise(block: Block, wrt: ContinuousSet, shares: list[int], ncp: int, sc
 
 def call_rules_again(block, wrt):
     """Call rules of Constraints again that left out an index: Pyomo treats a KeyError in a rule as Skip, and loses the equation."""
-    for component in block.component_objects(Constraint, descend_into=PLACES):
+    for component in own_components(block, Constraint, PLACES):
         if not is_indexed_by(component, wrt) or component.rule is None or len(component) == len(component.index_set()):
             continue
         if not is_discretisation_equation(component) and not is_generated(component):
@@ -179,7 +180,7 @@ def _hybrid_over_time(block, wrt):
     """``(type, name, data)`` of all hybrid components over time."""
     times = TimeIndex(wrt)
     for ctype in HYBRID:
-        for name, by_time in times.families(block.component_data_objects(ctype, descend_into=PLACES)).items():
+        for name, by_time in times.families_in(own_components(block, ctype, PLACES)).items():
             yield ctype, name, by_time.values()
 
 

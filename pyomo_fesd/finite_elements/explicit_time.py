@@ -2,11 +2,13 @@
 
 import logging
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from math import isfinite
+from operator import itemgetter
 
 from pyomo.core import Block, Constraint, value
+from pyomo.core.expr.relational_expr import RelationalExpression
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
 
@@ -51,13 +53,13 @@ def warn_explicit_time(moving: MovingGrid, expressions: Iterable[tuple]) -> None
 def _depends_on_time(by_time, stage):
     """Whether points of one control stage differ."""
     points = _spread([t for t in by_time if t in stage])
-    return any(differ([by_time[t] for t in points if stage[t] == s]) for s in {stage[t] for t in points})
+    return any(differ([by_time[t]() for t in points if stage[t] == s]) for s in {stage[t] for t in points})
 
 
 def expressions_over_time(
     block: Block, moving: MovingGrid, integrands: list[Integrand], laws: Iterable[tuple]
 ) -> list[tuple[str, dict[float, Callable]]]:
-    """Return ``(name, {label: function that gives an expression})`` of all components over time that a user's rule made.
+    """Return ``(name, {label: function that gives expressions and relations})`` of all components over time that a rule made.
 
     Parameters
     ----------
@@ -65,24 +67,22 @@ def expressions_over_time(
         guards and resets of state jumps, conditions of modes with hysteresis
     """
     components = block.component_objects((Constraint, Complementarity), active=True, descend_into=Block)
-    datas = (d for c in components if not is_discretisation_equation(c) for d in c.values() if d.active)
-    by_name = TimeIndex(moving.wrt).families(datas)
-    found = [(name, {t: partial(_expression, d) for t, d in by_time.items()}) for name, by_time in by_name.items()]
+    by_name = TimeIndex(moving.wrt).families_in(c for c in components if not is_discretisation_equation(c))
+    active = ((name, {t: partial(_stated, d) for t, d in by_time.items() if d.active}) for name, by_time in by_name.items())
     points = _spread([t for e in moving.grid.elements for t in e.points])
-    found += [(i.name, {t: partial(i.at, t) for t in points}) for i in integrands]
-    return found + [(name, {t: partial(_weighted, parts) for t, parts in by_time.items()}) for name, by_time in laws]
+    found = [*filter(itemgetter(1), active), *((i.name, {t: partial(_alone, i, t) for t in points}) for i in integrands)]
+    return found + [(name, {t: partial(tuple, parts) for t, parts in by_time.items()}) for name, by_time in laws]
 
 
-def _expression(data):
-    """One expression whose value depends on all numbers of a constraint or condition."""
+def _alone(integrand, t):
+    return (integrand.at(t),)
+
+
+def _stated(data):
+    """What a constraint or condition states, as it was written: to make an expression of it at every time would take longer."""
     if data.ctype is Complementarity:
-        sides = [read_side(a) for a in getattr(data, '_args', None) or ()]
-        return _weighted(part for s in sides for part in s)
-    return data.body - _weighted((data.lower, data.upper))
-
-
-def _weighted(parts):
-    return sum(k * part for k, part in enumerate((part for part in parts if part is not None), start=1))
+        return [part for arg in getattr(data, '_args', None) or () for part in read_side(arg)]
+    return (data.expr,)
 
 
 def _spread(points):
@@ -90,16 +90,16 @@ def _spread(points):
     return points[:: max(1, len(points) // COMPARED)]
 
 
-def differ(expressions: list[Callable]) -> bool:
-    """Whether the expressions that these functions return differ where all variables have the same values."""
-    bodies = [expression() for expression in expressions]
+def differ(statements: list[Sequence]) -> bool:
+    """Whether some expressions and relations differ from others where all variables have the same values."""
     by_length = defaultdict(list)
-    for leaves in map(_leaves, bodies):
+    for leaves in map(_leaves, statements):
         by_length[len(leaves)].append(leaves)
     # a factor of 1 or a term of 0 leaves an expression that is built otherwise
     change = any(_unequal(a, b) for first, *others in by_length.values() for other in others for a, b in zip(first, other))
     if not change and len(by_length) == 1:
         return False
+    bodies = list(map(_body, statements))
     compared = [numbers for numbers in (_at_trial(bodies, trial) for trial in TRIALS) if None not in numbers]
     return any(_unequal(numbers[0], number) for numbers in compared for number in numbers) if compared else change
 
@@ -108,9 +108,15 @@ def _unequal(a, b):
     return abs(a - b) > SAME * max(abs(a), abs(b))
 
 
-def _leaves(body):
-    """The finite numbers in an expression, in its order."""
-    return [number for number in prefix_tokens([body], _enter) if number.__class__ in (int, float) and isfinite(number)]
+def _leaves(stated):
+    """The finite numbers in some expressions and relations, in their order."""
+    return [number for number in prefix_tokens(stated, _enter) if number.__class__ in (int, float) and isfinite(number)]
+
+
+def _body(stated):
+    """One expression whose value depends on all numbers in some expressions and relations."""
+    parts = (part for expr in stated for part in (read_side(expr) if isinstance(expr, RelationalExpression) else (expr,)))
+    return sum(k * part for k, part in enumerate((part for part in parts if part is not None), start=1))
 
 
 def _enter(node):

@@ -90,7 +90,7 @@ class RightLimits:
 
     def _same(self, left, right):
         """Whether two expressions contain no controls of a control stage, and have the same numbers."""
-        return all(self._continuous.across(v) for v in variables_in(left)) and not differ([lambda: left, lambda: right])
+        return all(self._continuous.across(v) for v in variables_in(left)) and not differ([(left,), (right,)])
 
     def _of_next_stage(self, before, expr):
         """An expression of the next element at its left boundary: controls keep their new values."""

@@ -95,15 +95,11 @@ class TimeComplementarity:
 def conditions_over_time(block: Block, times: TimeIndex) -> tuple[dict, dict]:
     """Return the active conditions over time on ``block``: pairs, and mixed conditions, each as name -> {time: data}."""
     pairs, mixed = {}, {}
-    for name, by_time in times.families(_active_complementarities(block)).items():
-        for t, data in by_time.items():
+    for name, by_time in times.families_in(block.component_objects(Complementarity, active=True, descend_into=Block)).items():
+        for t, data in ((t, data) for t, data in by_time.items() if data.active):
             group = mixed if isinstance(read_complementarity(data), Mixed) else pairs
             group.setdefault(name, {})[t] = data
     return pairs, mixed
-
-
-def _active_complementarities(block):
-    return block.component_data_objects(Complementarity, active=True, descend_into=Block)
 
 
 def refuse_lists_of_times(block: Block, times: TimeIndex) -> None:

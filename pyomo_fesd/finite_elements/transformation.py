@@ -24,7 +24,7 @@ from pyomo_fesd.core import (
     is_generated,
     label_decimals,
     moving_grids,
-    own_data,
+    own_components,
     read_grid,
     read_keywords,
     restored_on_error,
@@ -287,8 +287,8 @@ def _add_switching(moving, switching, complementarities, continuity, config):
 
 def _relate_variables(moving, switching):
     """Tell the solver which variables are one quantity over time, and have one size, and which belong to one element."""
-    variables = own_data(moving.block.model(), Var, descend_into=(Block, Disjunct))
-    families = list(TimeIndex(moving.wrt).families(variables).values())
+    variables = own_components(moving.block.model(), Var, descend_into=(Block, Disjunct))
+    families = list(TimeIndex(moving.wrt).families_in(variables).values())
     homotopy_hints(moving.block).alike += [tuple(family.values()) for family in families]
     if switching:
         add_chain(moving, families)

@@ -28,7 +28,7 @@ STEP = "a Disjunction with the two sides of the step"
 
 
 def warn_untaken_kinks(expressions: Iterable[tuple[str, Mapping[float, Callable]]]) -> None:
-    """Warn of the kinks in ``(name, {time: function that gives an expression})``."""
+    """Warn of the kinks in ``(name, {time: function that gives expressions and relations})``."""
     found = {}
     for name, by_time in expressions:
         for function, remedy in _kinks(next(reversed(by_time.values()))()):
@@ -44,9 +44,9 @@ def warn_untaken_kinks(expressions: Iterable[tuple[str, Mapping[float, Callable]
         )
 
 
-def _kinks(expr) -> Iterator[tuple[str, str]]:
-    """``(function, remedy)`` for every kink in an expression."""
-    waiting = [expr]
+def _kinks(stated) -> Iterator[tuple[str, str]]:
+    """``(function, remedy)`` for every kink in some expressions and relations."""
+    waiting = list(stated)
     while waiting:
         node = waiting.pop()
         if hasattr(node, 'is_expression_type') and node.is_expression_type():

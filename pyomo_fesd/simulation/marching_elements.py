@@ -17,14 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import ceil
 
 from pyomo.common.dependencies import pandas as pd
 from pyomo.core import Block, Expression, Var
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import Element, FesdError, TimeIndex, moving_grids, own_data, phase
+from pyomo_fesd.core import Element, FesdError, TimeIndex, moving_grids, own_components, phase
 from pyomo_fesd.diagnostics import MarchReview
 from pyomo_fesd.finite_elements import differ
 from pyomo_fesd.results import SWITCHES, ElementSwitches, ElementTable
@@ -76,10 +75,9 @@ class MarchingElements:
         self._progress = Progress(times.wrt, self._moving.grid.stages, deadline)
         self._solver = ElementSolver(model, times, inputs, options, timer, self._progress)
         for interval in self._intervals:
-            others = interval.places[1:]
-            if not self._solver.are_alike(others) or _expressions_differ(model, times, others):
+            if not self._solver.are_alike(interval.places[1:]) or _expressions_differ(model, times, interval.places):
                 raise ElementsDiffer
-        self._over_time = list(times.families(own_data(model.model(), Var, (Block, Disjunct))).values())
+        self._over_time = list(times.families_in(own_components(model.model(), Var, (Block, Disjunct))).values())
         self._table, self._switches = ElementTable(model, times), ElementSwitches(model, times)
         self._review = MarchReview(model, times.wrt)
 
@@ -201,6 +199,6 @@ def _intervals(grid, numbers) -> Iterator[_Interval]:
 
 def _expressions_differ(model, times, places):
     """Whether a named expression, which no equation need contain, has other numbers in other elements."""
-    named = times.families(own_data(model, Expression, Block)).values()
-    at_points = ([partial(some.__getitem__, place.points[0]) for place in places if place.points[0] in some] for some in named)
+    named = times.families_in(own_components(model, Expression, Block)).values()
+    at_points = ([(some[place.points[0]],) for place in places if place.points[0] in some] for some in named)
     return any(len(expressions) > 1 and differ(expressions) for expressions in at_points)

@@ -22,6 +22,7 @@ from pyomo.gdp import Disjunct
 from pyomo_fesd.core import (
     TimeIndex,
     all_switched_systems,
+    own_components,
     own_data,
     phase,
     restored,
@@ -37,7 +38,7 @@ from pyomo_fesd.simulation.marching_elements import ElementsDiffer
 logger = logging.getLogger('pyomo_fesd')
 
 #: Places of elements that march in each interval, and how many times as many elements there are where it is worth while.
-PLACES, WORTH_IT = 4, 2
+PLACES, WORTH_IT = 3, 2
 #: Largest part of an interval that its places take.
 PART = 0.5
 #: Options of ``fesd.finite_elements`` that ``simulate`` takes for a model without elements.
@@ -122,7 +123,7 @@ class WithoutGrid:
 
     def _start(self):
         """Let variables at the times that the elements have added begin with the values of the first time."""
-        families = TimeIndex(self._wrt).families(own_data(self._model.model(), Var, (Block, Disjunct)))
+        families = TimeIndex(self._wrt).families_in(own_components(self._model.model(), Var, (Block, Disjunct)))
         hold_first_values(families.values(), self._wrt.first(), ComponentSet(v for u in self._held for v in u.values()))
 
     def _lay(self, **changes):

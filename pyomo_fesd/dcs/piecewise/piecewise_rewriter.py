@@ -114,6 +114,7 @@ WRITERS = {
     Objective: PiecewiseRewriter.write_objective,
     Complementarity: PiecewiseRewriter.write_complementarity,
 }
+SOUGHT = frozenset(WRITERS) | {PiecewiseLinearFunction}
 
 
 def _refuse_written_by_pyomo(block, times):
@@ -154,11 +155,12 @@ class _Survey:
                 self.piecewise.append(place)
                 continue
             generated = is_generated(place)
-            for component in place.component_map(active=True).values():
+            for component in place.component_map(SOUGHT, active=True).values():
                 if component.ctype is PiecewiseLinearFunction:
                     self.functions += _active(component)
-                elif component.ctype in WRITERS and not generated and not _is_ours(component):
-                    sources.update((id(data), data) for data in _active(component))
+                elif not generated and not _is_ours(component):
+                    for data in _active(component):
+                        sources[id(data)] = data
         self.sources = list(sources.values())
 
 
@@ -176,7 +178,7 @@ def _is_ours(component):
 
 def _contains(source, wrt):
     """Whether a component contains a piecewise function."""
-    sides = _complementarity_sides(source) if source.ctype is Complementarity else [source.expr]
+    sides = _complementarity_sides(source) if source.ctype is Complementarity else (source.expr,)
     return any(contains_node(side, NODES, enter=lambda named: not _waits(named, wrt)) for side in sides)
 
 

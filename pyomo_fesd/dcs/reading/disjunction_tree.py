@@ -20,7 +20,7 @@ from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint
 from pyomo.gdp import Disjunct, Disjunction
 
-from pyomo_fesd.core import FesdError
+from pyomo_fesd.core import FesdError, data_of, own_data
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,15 +75,11 @@ class DisjunctionTree:
 
 def active_constraints(disjunct) -> list:
     """Return the active constraints of a disjunct and of the Blocks in it."""
-    found = []
-    for component in disjunct.component_map().values():
-        ctype = component.ctype
-        if ctype is Block:
-            return list(disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
-        if ctype is Constraint and component.active:
-            found += [data for data in component.values() if data.active]
+    if Block in disjunct._ctypes:
+        return list(disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
     # most disjuncts hold a few Constraints, and there is one at every time: Pyomo's walk takes longer than all the rest
-    return found
+    components = disjunct.component_map(Constraint, active=True).values()
+    return [data for component in components for data in data_of(component) if data.active]
 
 
 def enclosing_disjunct(component):
@@ -108,7 +104,8 @@ class Nesting:
     def __init__(self, model, times, with_hysteresis=()):
         self._times, self._with_hysteresis = times, with_hysteresis
         self._inside, self._hosts = ComponentMap(), ComponentMap()
-        for disjunction in model.component_data_objects(Disjunction, active=True, descend_into=(Block, Disjunct)):
+        found = own_data(model, Disjunction, (Block, Disjunct), active=True)
+        for disjunction in (d for d in found if d.active):
             host = self._hosts[disjunction] = self._host(disjunction)
             if host is not None:
                 self._inside.setdefault(host, []).append(disjunction)

@@ -35,8 +35,7 @@ def refuse_contents(tree, modes) -> None:
 
 def _components(disjunct):
     """The components of a disjunct and of the Blocks in it."""
-    direct = list(disjunct.component_map().values())
-    return disjunct.component_objects(descend_into=Block) if any(c.ctype is Block for c in direct) else direct
+    return disjunct.component_objects(descend_into=Block) if Block in disjunct._ctypes else disjunct.component_map().values()
 
 
 def _refuse_active(disjunct, component, tree):
