@@ -1,6 +1,7 @@
 """A scalar function evaluated for many instances at once, one operation after the other on columns.
 
-casadi's ``map`` calls the function once for each instance, which takes longer than a short function itself.
+casadi's ``map`` calls the function once for each instance, which takes longer than a short function itself; for long functions of
+few instances ``row_classes`` uses it all the same.
 """
 
 import casadi as ca

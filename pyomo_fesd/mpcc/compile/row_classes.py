@@ -14,6 +14,10 @@ import numpy as np
 
 from pyomo_fesd.mpcc.compile.elementwise import elementwise
 
+#: With more operations than so many times its instances, a function is called for one instance after the other: a node of MX for
+#: each operation takes longer then, and much longer to make.
+LONG = 10
+
 
 def _fields(self):
     return {name: getattr(self, name) for name in self.__dataclass_fields__}
@@ -84,11 +88,20 @@ class RowClass:
         kind, count = type(x), self.columns.shape[1]
         if function.numel_out(0) == 0:
             return kind(0, 1)
-        if count == 1:
-            return ca.vec(function(x[self.columns[:, 0].tolist()], ca.DM(self.constants), *factors))
+        if count == 1 or function.n_instructions() > LONG * count:
+            return self._by_calls(function, x, *factors)
         s = [x[columns.tolist()] for columns in self.columns]
         constants = [kind(ca.DM(numbers.tolist())) for numbers in self.constants]
         return ca.vertcat(*elementwise(function, [s, constants, *([f] for f in factors)], count))
+
+    def _by_calls(self, function, x, *factors):
+        """The same by one call for each instance."""
+        (a, count), outputs = self.columns.shape, function.numel_out(0)
+        s, constants = x[self.columns.T.ravel().tolist()], ca.DM(self.constants)
+        if count == 1:
+            return ca.vec(function(s, constants, *factors))
+        found = function.map(count)(ca.reshape(s, a, count), constants, *(ca.reshape(f, 1, count) for f in factors))
+        return ca.vec(ca.reshape(found, outputs, count).T)
 
     @cached_property
     def _symbolic(self):

@@ -65,7 +65,9 @@ class Descent:
 
     def negligible(self, value, floor=FLOOR) -> bool:
         """Whether a value of the program is round-off: below the part ``floor`` of the objective's largest term."""
-        return -value <= floor * self._reach_of_objective()
+        # the changes, which take longer to find than a small program to solve, only make the largest term larger
+        least = float(np.max(np.abs(self._p.cost) * self._p.reach, initial=0.0))
+        return -value <= floor * least or -value <= floor * self._reach_of_objective()
 
     def _bounds(self, y):
         """Multipliers of the right sign, and by how much each column and each row may descend."""

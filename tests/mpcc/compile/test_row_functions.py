@@ -11,7 +11,7 @@ from problems.parts import compiled
 from pyomo.mpec import Complementarity, complements
 from pyomo.repn.plugins.nl_writer import NLWriter
 
-from pyomo_fesd.mpcc.compile import assemble, grouped_rows, scaled_functions
+from pyomo_fesd.mpcc.compile import assemble, grouped_rows, row_classes, scaled_functions
 from pyomo_fesd.mpcc.compile.derivatives import automatic, plain_nlp
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS, Relaxation
 from pyomo_fesd.mpcc.subproblems.side_constraints import sort_sides
@@ -20,11 +20,12 @@ from pyomo_fesd.mpcc.subproblems.side_constraints import sort_sides
 WAYS = [(ca.SX, 1), (ca.SX, 1000), (ca.MX, 1), (ca.MX, 1000)]
 
 
-@pytest.fixture(scope='module', autouse=True)
-def by_classes():
-    """No model counts as short: derivatives are those of the classes."""
+@pytest.fixture(scope='module', autouse=True, params=[0, 10**9], ids=['called', 'operations'])
+def by_classes(request):
+    """No model counts as short: derivatives are those of the classes, called for each instance or operation by operation."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(scaled_functions, 'SHORT', -1)
+        patch.setattr(row_classes, 'LONG', request.param)
         yield
 
 

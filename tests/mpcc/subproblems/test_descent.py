@@ -40,3 +40,13 @@ def test_the_factor_of_the_objective_does_not_change_the_relative_descent():
     scaled = Program(1e6 * program.cost, *list(vars(program).values())[1:7])
     assert Descent(scaled, list).proved(1e6 * y) == pytest.approx(Descent(program, list).proved(y))
     assert Descent(program, list).proved(y) > 0
+
+
+def test_a_descent_is_negligible_beside_the_largest_term_or_its_changes():
+    program, _, _ = drawn(3)
+    largest = float(np.max(np.abs(program.cost) * program.reach))
+    changing = Descent(program, lambda: [(1e3 * program.cost, lambda y: 0.0 * program.cost)])
+    assert Descent(program, list).negligible(-0.9e-8 * largest)
+    assert not Descent(program, list).negligible(-1.1e-8 * largest)
+    assert changing.negligible(-0.9e-5 * largest)
+    assert not changing.negligible(-1.1e-5 * largest)
