@@ -27,21 +27,22 @@ class BranchSolutions:
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
         self._known = {}
 
-    def certified(self, w, zero, duals=None, below=np.inf, **more):
+    def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
 
+        One that is above ``enough`` does not count either: its LPEC may take longer than all NLPs, and its answer would not matter.
         From the same values the same branch is solved once: neighbours of points that hardly differ lead to it again and again.
         """
         if duals is not None or 'box' in more:
-            return self._certified(w, zero, duals, below, **more)
+            return self._certified(w, zero, duals, below, enough, **more)
         key = hash((w.tobytes(), zero.tobytes(), self._c.lbx.tobytes(), self._c.ubx.tobytes(), *sorted(more.items())))
         found, least = self._known.get(key, (None, -np.inf))
-        if found is None and below > least:
-            found = self._certified(w, zero, duals, below, **more)
-            self._known[key] = found, below
-        return None if found is None or _is_clearly_above(found.f, below) else found
+        if found is None and min(below, enough) > least:
+            found = self._certified(w, zero, duals, below, enough, **more)
+            self._known[key] = found, min(below, enough)
+        return None if found is None or _is_clearly_above(found.f, below) or found.f > enough else found
 
-    def _certified(self, w, zero, duals, below, **more):
+    def _certified(self, w, zero, duals, below, enough, **more):
         solved, equal = self._solve(w, zero, duals, below, **more)
         if solved is not None and not solved.solved and more.get('max_iter') in MORE:
             # feasible, so the branch has a solution, but not at its minimum yet
@@ -54,8 +55,7 @@ class BranchSolutions:
             if f < self._c.evaluate(self._c.x0).f:
                 raise Stop(Outcome.UNBOUNDED)
             return None
-        if _is_clearly_above(f, below):
-            # its LPEC may take longer than all NLPs, and its answer would not matter
+        if _is_clearly_above(f, below) or f > enough:
             return None
         certificate = self._subsolves.certify(solved, equal)
         return Point(solved, f, certificate, equal) if certificate.feasible else None

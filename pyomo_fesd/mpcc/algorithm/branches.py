@@ -14,6 +14,8 @@ from pyomo_fesd.mpcc.subproblems import G_ZERO, MATTERS, Stationarity
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
+#: So much in a neighbouring branch, where a place of least extent gives a little less to each one that takes it over.
+WORTH = 1e-6
 #: So much from a point whose branch NLP did not end: smaller steps only go on in a branch that Ipopt cannot finish.
 UNFINISHED = 1e-3
 #: Attempts at a branch NLP before it counts as infeasible.
@@ -113,8 +115,8 @@ class Branches:
             point, neighbour = self.run.point, neighbours[0]
             neighbours.rotate(-1)
             left -= 1
-            self._try_neighbour(point, neighbour)
-            if self._is_progress(point):
+            self._try(point, neighbour)
+            if self._is_progress(point, WORTH):
                 left = len(neighbours)
 
     def _try_without_all_short(self):
@@ -127,12 +129,12 @@ class Branches:
             by_last = {neighbour.short.tobytes(): neighbour for neighbour in short}
             if len(by_last) > 1:
                 for some in (reversed(by_first.values()), reversed(by_last.values())):
-                    self._try_neighbour(point, *some)
-            if not self._is_progress(point):
+                    self._try(point, *some)
+            if not self._is_progress(point, PROGRESS):
                 return
 
-    def _try_neighbour(self, point, *neighbours):
-        """Solve the branch of neighbours of a point, one after the other, unless it was tried, and go on from there."""
+    def _try(self, point, *neighbours):
+        """Solve the branch of neighbours of a point, one after the other, unless it was tried, and go on from a better solution."""
         zero = self.zero_sides(point, *neighbours)
         if zero is None or self.tried(zero):
             return
@@ -141,9 +143,9 @@ class Branches:
             start[neighbour.starts] = neighbour.at
         self._widen_from(self.improve_from(self._point(start, zero, None, True, below=point.f), False))
 
-    def _is_progress(self, before):
-        """Whether the incumbent is better than a point ``before``."""
-        return self.run.point.f < before.f - PROGRESS * max(1.0, abs(before.f))
+    def _is_progress(self, before, part):
+        """Whether the incumbent is better than a point ``before`` by this relative part."""
+        return self.run.point.f < before.f - part * max(1.0, abs(before.f))
 
     def without_short(self, point):
         """A better point in a neighbouring branch for a variable of ``point`` at its lower bound; None if there is none.
@@ -152,8 +154,8 @@ class Branches:
         """
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for zero in self._beside_short(point):
-            found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f)
-            if is_below(found, enough):
+            found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f, enough=enough)
+            if found is not None:
                 return found
         return None
 
@@ -298,6 +300,7 @@ class Branches:
         sets = self._subsolves.sets(point.w, tolerance)
         if np.count_nonzero(sets.gamma) <= point.certificate.biactive:
             return None
+        limits = self._subsolves.patience() | (limits or {})
         step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal, limits=limits)
         if not step.solved or step.descent <= clear:
             return None

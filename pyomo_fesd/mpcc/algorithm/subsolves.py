@@ -121,8 +121,12 @@ class Subsolves:
 
     def suggestion(self, w, sets, Delta):
         """Solve an LPEC that may stop early."""
+        return self.lpec(w, sets, Delta, limits=SUGGESTION | self.patience())
+
+    def patience(self) -> dict:
+        """HiGHS' limit of time for an LPEC that proves nothing."""
         spent = sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch'))
-        return self.lpec(w, sets, Delta, limits=SUGGESTION | {'time_limit': max(LEAST_TIME, SHARE * spent)})
+        return {'time_limit': max(LEAST_TIME, SHARE * spent)}
 
     def certify(self, nlp, equal):
         """Certify the solution of a branch NLP, whatever the limits; HiGHS stops at the deadline."""
