@@ -9,6 +9,7 @@ import pyomo_fesd
 from pyomo_fesd.core import all_hints, moving_grids
 from tests.models import dcs
 from tests.problems import best_threshold, carried, sliding_at_end, through_zero, touching
+from tests.problems.bounce_at_end import END, Ball
 from tests.problems.running import move, transform
 
 
@@ -149,3 +150,23 @@ def test_a_surface_to_slide_on_that_is_reached_at_the_last_time(seed, form, rela
 
 def test_the_seeds_have_both_verdicts():
     assert {sliding_at_end.Slide.draw(seed).is_minimum for seed in (12, 19, 22, 24, 25)} == {True, False}
+
+
+# Impacts at the last time
+
+
+@pytest.mark.parametrize('nfe', [2, 3, 4])
+@pytest.mark.parametrize('e', [0, 0.5, 1])
+@pytest.mark.parametrize('a, b', [(-1, 0.2), (1, 0.1), (-1, -2), (0.4, 0.3), (1, -0.1)])
+def test_an_impact_at_the_last_time_is_an_order_of_its_own(a, b, e, nfe):
+    ball = Ball(e, a, b)
+    assert abs(ball.slope) > 0.05
+    assert pyomo_fesd.certify(ball.simulated(nfe)).certified == (ball.slope > 0)
+
+
+def test_a_solve_goes_on_where_an_impact_before_the_last_time_is_better():
+    m = Ball(0.5, -1, 0).simulated(4)
+    results = pyo.SolverFactory('mpec_hybrid').solve(m, warm_start=True)
+    assert results.solver.stationarity == 'B'
+    # the highest point of the bounce: sqrt(2 theta) = 3/4 sqrt(2)
+    assert m.theta.value == pytest.approx(0.5625, abs=1e-5) and m.q[END].value == pytest.approx(0.125, abs=1e-8)

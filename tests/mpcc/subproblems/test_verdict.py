@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pyomo_fesd.mpcc.subproblems import Verdict
-from pyomo_fesd.mpcc.subproblems.verdict import charge, of_all, of_growth
+from pyomo_fesd.mpcc.subproblems.verdict import charge, of_all, of_growth, of_orders
 
 
 def lpec(slope, solved=True):
@@ -57,3 +57,12 @@ def test_copies_show_no_descent_only_if_all_of_them_do():
     assert of_all([none, unknown]) is unknown
     assert of_all([unknown, descent]) is descent
     assert of_all([none, impossible]) is impossible
+
+
+def test_orders_are_excluded_only_together():
+    none, descent, unknown, impossible = Verdict.NO_DESCENT, Verdict.DESCENT, Verdict.UNKNOWN, Verdict.IMPOSSIBLE
+    assert of_orders([impossible, impossible]) is impossible
+    assert of_orders([impossible, none]) is none
+    assert of_orders([none, unknown]) is unknown
+    assert of_orders([unknown, descent, impossible]) is descent
+    assert of_orders([descent, Verdict.NONE]) is Verdict.NONE
