@@ -1,5 +1,6 @@
 """One instance by one method, in a child process of ``run.py``: its row."""
 
+import gc
 import re
 import time
 from functools import lru_cache
@@ -46,12 +47,14 @@ def serve(pipe):
 
 
 def _warm_up():
-    """Load the modules that a first solve imports: their time belongs to no instance."""
+    """Load the modules that a first solve imports: their time belongs to no instance, nor do later searches for garbage."""
     m = pyo.ConcreteModel()
     m.x = pyo.Var([0, 1], bounds=(0, None), initialize=1)
     m.pair = Complementarity(expr=complements(0 <= m.x[0], m.x[1] >= 0))
     m.cost = pyo.Objective(expr=(m.x[0] - 1) ** 2 + (m.x[1] - 2) ** 2)
     SolverFactory('mpec_hybrid').solve(m)
+    gc.collect()
+    gc.freeze()
 
 
 def _run(path, method, limit):
