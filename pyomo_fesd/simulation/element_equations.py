@@ -7,7 +7,7 @@ all.  Plants whose data or controls differ from stage to stage need no special t
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pyomo.common.collections import ComponentMap
 from pyomo.core.base.var import VarData
@@ -75,6 +75,8 @@ class ElementEquations:
     times : TimeIndex
     factor : callable VarData -> the user's ``scaling_factor`` or None
     size_factor : callable VarData -> factor by its size, or None, where there is no such factor of the user
+    typical : ComponentMap VarData -> value
+        known values at which sizes of the equations are found, where the present ones hide some
     """
 
     rows: list[RelationalExpression]
@@ -92,6 +94,7 @@ class ElementEquations:
     times: TimeIndex
     factor: Callable[[VarData], float | None]
     size_factor: Callable[[VarData], float | None] = lambda v: None
+    typical: ComponentMap = field(default_factory=ComponentMap)
 
     @property
     def all_rows(self) -> list[RelationalExpression]:

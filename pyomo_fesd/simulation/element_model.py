@@ -15,7 +15,7 @@ class ElementModel:
     Attributes
     ----------
     model : ConcreteModel
-        with ``unknown``, ``known`` (fixed) and ``row``
+        with ``unknown``, ``known`` (fixed, at first with the ``typical`` values of ``pattern``) and ``row``
     length : VarData or None
         the length multiplier
     event_rows : list of list of ConstraintData
@@ -42,6 +42,9 @@ class ElementModel:
             self._add(row, pattern, factors)
         self.event_rows = [[self._add(row, pattern, factors) for row in rows] for rows in pattern.event_functions.values()]
         self.set_known(pattern)
+        for v, number in pattern.typical.items():
+            if id(v) in self._copies:
+                self._copies[id(v)].set_value(number)
         m.known.fix()
 
     def _add(self, row, pattern, factors):

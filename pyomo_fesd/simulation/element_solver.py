@@ -2,7 +2,9 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import chain
 
+from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Var
 from pyomo.core.base.var import VarData
 
@@ -181,7 +183,10 @@ class ElementSolver:
                 functions = {}
                 for source in self._sources():
                     functions |= source.event_functions(element)
-                self._equations[element.n] = self._reader.element(element, functions)
+                equations = self._reader.element(element, functions)
+                # the rows of a mode that is off show no size
+                weights = ComponentMap(chain.from_iterable(modes.equal_weights(element) for modes in self._hysteresis))
+                self._equations[element.n] = replace(equations, typical=weights)
         return self._equations[element.n]
 
     def _class_of(self, equations, element):

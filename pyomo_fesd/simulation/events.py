@@ -79,12 +79,19 @@ class HysteresisEvents:
         return [m.weights[label].expr for m in self._modes if m.weights[label].expr.is_variable_type()]
 
     def event_functions(self, element) -> dict[str, list]:
-        """Return the conditions in an element by name, each for its mode only: nu c + (1 - nu) >= 0 at every label."""
+        """Return the conditions in an element by name, each for its mode only: nu c >= 0 at every label.
+
+        No constant is added where the mode is off: it would be without the unit of c, and the size of the function.
+        """
         return {
-            f'{m.name} {k}': [m.weight(element) * c + (1 - m.weight(element)) >= 0 for c in values]
+            f'{m.name} {k}': [m.weight(element) * c >= 0 for c in values]
             for m in self._modes
             for k, values in enumerate(zip(*(m.conditions[t] for t in element.own_labels)))
         }
+
+    def equal_weights(self, element) -> list[tuple[VarData, float]]:
+        """Return weights of an element with which no mode is off."""
+        return [(m.weight(element).expr, 1 / len(self._modes)) for m in self._modes if m.independent]
 
     def set_weights(self, element) -> None:
         """Set the weights nu of an element."""

@@ -17,6 +17,7 @@ from pyomo.gdp import Disjunction
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
+from pyomo_fesd.simulation.element_class import ElementClass
 from tests.models import add_modes, dcs, scalar_ode, signum_of_scalars, units, units_by_index
 from tests.problems import (
     air_friction,
@@ -348,8 +349,11 @@ def test_a_start_that_is_fast_beside_the_elements(scale, form):
         assert 'mpcc' not in str(timer)  # Newton's method finds the arrival from the value at the first time
 
 
-@pytest.mark.parametrize('scale', [1e-4, 1e4])
-def test_a_relay_in_other_units(scale):
+@pytest.mark.parametrize('by_newton', [True, False])
+@pytest.mark.parametrize('scale', [1e-11, 1e-9, 1e-4, 1e4, 1e9])
+def test_a_relay_in_other_units(scale, by_newton, monkeypatch):
+    if not by_newton:
+        monkeypatch.setattr(ElementClass, 'newton_step', lambda *_: None)
     m = scalar_ode(x0=0.0, end=4)
     m.rest = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == 0)
     m.y[0].fix(0)
@@ -358,7 +362,8 @@ def test_a_relay_in_other_units(scale):
         rule=lambda m, t: [[m.x[t] <= scale, m.dx[t] == scale], [m.x[t] >= -scale, m.dx[t] == -2 * scale]],
     )
     m.relay[0].disjuncts[0].indicator_var.fix(True)
-    simulated(move(dcs(m, hysteresis=[m.relay]), 8, 1))
+    # no multiple of the length of an element is a switching time
+    simulated(move(dcs(m, hysteresis=[m.relay]), 13, 1))
     assert times(m) == pytest.approx([1.0, 2.0], abs=1e-6)
 
 
