@@ -7,8 +7,9 @@ Leaves: nothing.
 Does not apply: to expressions whose own units are inconsistent; they are left as they are.
 """
 
-from pyomo.common.numeric_types import native_types
 from pyomo.core.base.units_container import UnitsError, units
+
+from pyomo_fesd.core.node_search import leaves_of
 
 
 def unit_of(expr):
@@ -51,17 +52,6 @@ def _unless_dimensionless(unit):
 
 
 def _mentions_units(expr):
-    """Whether anything in ``expr`` has a unit; without, pint is not asked, which takes long to import.
-
-    This is asked at every time, so it is quicker than a visitor of Pyomo.
-    """
-    waiting = [expr]
-    while waiting:
-        node = waiting.pop()
-        if node.__class__ in native_types:
-            continue
-        if node.is_expression_type():
-            waiting.extend(node.args)
-        elif not (node.is_variable_type() or node.is_parameter_type()) or node.get_units() is not None:
-            return True  # a unit itself is neither
-    return False
+    """Whether anything in ``expr`` has a unit; without, pint is not asked, which takes long to import."""
+    # a unit itself is neither
+    return any(not (v.is_variable_type() or v.is_parameter_type()) or v.get_units() is not None for v in leaves_of(expr))
