@@ -14,6 +14,7 @@ from pyomo.core.base.expression import ExpressionData
 from pyomo.core.base.var import VarData
 from pyomo.mpec.complementarity import ComplementarityData
 
+from pyomo_fesd.core.changes import Change
 from pyomo_fesd.core.private_data import records_below
 
 SCOPE = 'pyomo_fesd.core.homotopy_hints'
@@ -48,7 +49,7 @@ class Penalty:
 
 @dataclass(frozen=True, eq=False)
 class NeighbourBranch:
-    """A branch beside a solution that no small step reaches, because several pairs have to change together.
+    """A branch beside a solution that no small step reaches, because several pairs have to change together: changes move.
 
     Attributes
     ----------
@@ -56,16 +57,15 @@ class NeighbourBranch:
         values at which variables start in this branch
     if_at_lower_bound : tuple of VarData
         the branch is tried only from a solution with one of these at its lower bound; empty: from every solution
-    takes_over : tuple of (ComplementarityData, ComplementarityData)
-        the first pair gets the zero side that the second one has in the solution
-    first_side_zero : tuple of ComplementarityData
-        pairs whose first side becomes zero
+    changes : tuple of Change
+        of these, the ones that are there in the solution come one place later, or earlier
+    later : bool
     """
 
     starts: tuple[tuple[VarData, float], ...] = ()
     if_at_lower_bound: tuple[VarData, ...] = ()
-    takes_over: tuple[tuple[ComplementarityData, ComplementarityData], ...] = ()
-    first_side_zero: tuple[ComplementarityData, ...] = ()
+    changes: tuple[Change, ...] = ()
+    later: bool = True
 
 
 @dataclass(frozen=True, eq=False)

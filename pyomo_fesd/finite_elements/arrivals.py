@@ -17,8 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pyomo_fesd.core import Arrival, Element, MovingGrid, Option, Place, Toggle, homotopy_hints
-from pyomo_fesd.finite_elements.coincidences import switching_together
-from pyomo_fesd.finite_elements.neighbour_branches import PairsByPlace, pairs_of_events
+from pyomo_fesd.finite_elements.changes import PairsByPlace, pairs_of_events, switching_together
 
 #: Directions from the inside to the two ends.
 TO_FIRST, TO_LAST = -1, 1

@@ -5,26 +5,22 @@ step changes their order: the point can be a minimum of the discretised problem 
 of a control stage, which keeps its time.  An element of length zero beside the boundary, in which some of them have switched and
 others not, belongs to the same solution; whether it can grow with descent decides whether the solution is one.
 
-Takes: the pairs of the moving grid, and which conditions switch together.
+Takes: the changes at the boundaries.
 Leaves: a ``Coincidence`` for each inner boundary in the block's ``HomotopyHints``; ``mpec_hybrid`` looks at it before it certifies.
 Does not apply: to a single element, and inside a control stage to a single system.
 """
 
-from collections import defaultdict
 from collections.abc import Iterator
+from itertools import chain
 
-from pyomo.core.expr.visitor import identify_variables
-
-from pyomo_fesd.core import Change, Coincidence, MovingGrid, all_switched_systems, homotopy_hints
-from pyomo_fesd.finite_elements.algebraic_graph import rule_of
-from pyomo_fesd.finite_elements.continuity import inner_label
+from pyomo_fesd.core import Change, Coincidence, MovingGrid, homotopy_hints
+from pyomo_fesd.finite_elements.changes import switching_together
 from pyomo_fesd.finite_elements.hysteresis import LEFT, RIGHT
-from pyomo_fesd.finite_elements.neighbour_branches import PairsByPlace
 
 
-def add_coincidences(moving: MovingGrid) -> None:
-    """Add the coincidences at every inner boundary."""
-    families, places, found = switching_together(moving), PairsByPlace(moving), homotopy_hints(moving.block).coincidences
+def add_coincidences(moving: MovingGrid, at_boundaries: list[dict[str, Change]]) -> None:
+    """Add the coincidences at every inner boundary, of the changes ``at_boundaries``."""
+    families, found = switching_together(moving), homotopy_hints(moving.block).coincidences
     names = _jumping_between_stages(moving)
     jumping = {family for name, family in families.items() if name in names}
     several = len(set(families.values())) > 1
@@ -36,9 +32,9 @@ def add_coincidences(moving: MovingGrid) -> None:
         # what jumps between control stages may switch there without an element to spare
         left_out = jumping if after.inputs_change and None in (later, earlier) else ()
         if several or after.opens_stage:
-            changes = tuple(_changes(places, before, families, left_out))
+            changes = tuple(change for family, change in at_boundaries[n].items() if family not in left_out)
             beside = moving.r[before.n], moving.r[after.n]
-            beyond = (None if v is None else _all_changes(places, elements[k]) for v, k in ((later, n + 1), (earlier, n - 1)))
+            beyond = (None if v is None else _all(at_boundaries[k].values()) for v, k in ((later, n + 1), (earlier, n - 1)))
             by_values = (tuple(_by_values(moving, before.n, step)) for step in (1, -1))
             found.append(Coincidence(changes, later, earlier, after.opens_stage, *beside, *beyond, *by_values))
 
@@ -49,20 +45,11 @@ def _jumping_between_stages(moving):
     return names | (set() if moving.hysteresis is None else {name for name, *_ in moving.hysteresis.beyond})
 
 
-def _changes(places, before, families, left_out) -> Iterator[Change]:
-    """The change of each family at the boundary after ``before``."""
-    compared = _by_family(places.compared(before), families)
-    happening = _by_family([(pair, None) for pair in places.happening(before)], families)
-    later, earlier = (_by_family(places.moved(before, step), families) for step in (1, -1))
-    for family in dict.fromkeys([*compared, *happening]):
-        if family not in left_out:
-            jumps = tuple(pair for pair, _ in happening[family])
-            yield Change(tuple(compared[family]), tuple(later[family]), tuple(earlier[family]), jumps)
-
-
-def _all_changes(places, before):
-    """All that changes at the boundary after ``before``."""
-    return Change(tuple(places.compared(before)), (), (), tuple(places.happening(before)))
+def _all(changes):
+    """All changes at one boundary as one, which does not move."""
+    differing = chain.from_iterable(change.differing for change in changes)
+    happening = chain.from_iterable(change.happening for change in changes)
+    return Change(tuple(differing), (), (), tuple(happening))
 
 
 def _by_values(moving, b, step) -> Iterator[tuple]:
@@ -92,48 +79,3 @@ def _by_values(moving, b, step) -> Iterator[tuple]:
 
 def _at_boundary(component, b):
     return [] if component is None else [(index, pair) for index, pair in component.items() if index[1] == b]
-
-
-def _by_family(pairs, families):
-    found = defaultdict(list)
-    for pair, partner in pairs:
-        found[families[pair.index()[0]]].append((pair, partner))
-    return found
-
-
-def switching_together(moving: MovingGrid) -> dict[str, str]:
-    """Return the family of each condition, mode with hysteresis and law of jumps, all by name.
-
-    A family has one selector, or its multipliers add up to 1: its conditions switch together.
-    """
-    families, owner, rules = {}, {}, all_switched_systems(moving.block.model()).continuous
-    for condition in moving.complementarities:
-        families[condition.name] = condition.name
-        for key in _shared(condition, inner_label(condition.sides, moving.wrt), rules):
-            _join(families, condition.name, owner.setdefault(key, condition.name))
-    for mode in [] if moving.hysteresis is None else moving.hysteresis.modes:
-        families[mode.name] = mode.system
-    for law in [] if moving.state_jumps is None else moving.state_jumps.laws:
-        families[law.name] = law.name
-    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
-    names = {id(condition): c.name for c in moving.complementarities for condition in c.conditions.values()}
-    for law in [] if impacts is None else impacts.laws:
-        families[law.name] = families[names[id(next(iter(law.touching.values())))]]
-    return families
-
-
-def _join(families, one, other):
-    one, other = families[one], families[other]
-    families.update((name, other) for name, family in families.items() if family == one)
-
-
-def _shared(condition, label, rules) -> Iterator:
-    """By id, the selectors of a condition, and the multipliers in the rule of its other side that have the same rule."""
-    if label is None:
-        return
-    jumping, other = condition.sides[label]
-    if not condition.continuous[0]:
-        yield from map(id, identify_variables(jumping, include_fixed=True))
-    rule = rule_of(other, rules) if other.is_variable_type() else None
-    if rule is not None and other.index() in rule:
-        yield from (id(v) for v in identify_variables(rule[other.index()].expr) if rule_of(v, rules) is rule)

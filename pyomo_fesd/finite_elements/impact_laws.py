@@ -151,7 +151,7 @@ def _add_sticking_pairs(moving, law, element):
     """(24): without restitution; N is free after an element that is closed, where the velocity is 0 by itself."""
     impacts, b, distance = moving.state_jumps.impacts, element.n - 1, law.distances[element.left]
     P, N = impacts.above[law.name, b], impacts.below[law.name, b]
-    room = distance - AHEAD * element.length * N
+    room = distance - AHEAD * moving.duration(element) * N
     if b:
         # a force that gives the impulse within an element: both are relaxed alike
         force = impacts.normal_impulse(law.name, b) / element.length

@@ -34,6 +34,7 @@ from pyomo_fesd.core import (
 )
 from pyomo_fesd.finite_elements.arrivals import add_arrivals
 from pyomo_fesd.finite_elements.chain_of_elements import add_chain
+from pyomo_fesd.finite_elements.changes import changes_at_boundaries
 from pyomo_fesd.finite_elements.coincidences import add_coincidences
 from pyomo_fesd.finite_elements.contacts import read_contacts, with_departures, without_left_slip
 from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
@@ -280,8 +281,9 @@ def _add_switching(moving, switching, complementarities, continuity, config):
     add_equilibration(moving, config.equilibration, config.rho)
     if config.equilibration == 'two_stage':
         add_sliding_exits(moving)
-    add_neighbour_branches(moving)
-    add_coincidences(moving)
+    changes = changes_at_boundaries(moving)
+    add_neighbour_branches(moving, changes)
+    add_coincidences(moving, changes)
     add_arrivals(moving)
 
 

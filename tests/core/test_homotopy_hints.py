@@ -13,7 +13,7 @@ from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
-from pyomo_fesd.core import BranchConstraint, NeighbourBranch, Penalty, all_hints, homotopy_hints, records_below
+from pyomo_fesd.core import BranchConstraint, Change, NeighbourBranch, Penalty, all_hints, homotopy_hints, records_below
 from pyomo_fesd.core.homotopy_hints import SCOPE
 from tests.models import dcs
 from tests.problems import carried
@@ -33,7 +33,8 @@ def equal_parts(block):
     hints.branch_constraints.append(BranchConstraint(block.alike, block.equal, tentative=True))
     hints.penalties.append(Penalty(block.difference, 0.1))
     hints.guide_bounds[block.x] = (0.5, 2)
-    hints.neighbour_branches.append(NeighbourBranch(((block.y, 3.0),), (block.x,), ((block.other, block.alike),), (block.alike,)))
+    change = Change(((block.other, block.alike),), ((block.other, block.alike), (block.alike, None)), ())
+    hints.neighbour_branches.append(NeighbourBranch(((block.y, 3.0),), (block.x,), (change,)))
     return block
 
 
@@ -45,9 +46,9 @@ def assert_hints_of(block, model):
     assert penalty.expression is block.difference and penalty.weight == 0.1
     assert [v for v in identify_variables(penalty.expression.expr)] == [block.x, block.y]
     assert [(v, bounds) for v, bounds in hints.guide_bounds.items()] == [(block.x, (0.5, 2))]
-    ((start, value),), (short,), ((target, source),) = branch.starts, branch.if_at_lower_bound, branch.takes_over
-    assert start is block.y and value == 3.0 and short is block.x
-    assert target is block.other and source is block.alike and branch.first_side_zero == (block.alike,)
+    ((start, value),), (short,), (change,) = branch.starts, branch.if_at_lower_bound, branch.changes
+    assert start is block.y and value == 3.0 and short is block.x and branch.later
+    assert change.later == ((block.other, block.alike), (block.alike, None))
 
 
 def test_hints_stay_on_the_block_and_are_found_from_the_model():
@@ -179,8 +180,8 @@ def test_a_copy_of_a_discretised_model_has_hints_of_its_own(way):
     for hint in theirs.branch_constraints:
         assert hint.pair.model() is other and hint.constraint.model() is other
     for branch in theirs.neighbour_branches:
-        for pair, source in branch.takes_over:
-            assert pair.model() is other and source.model() is other
+        for pair, source in branch.changes[0].later:
+            assert pair.model() is other and (source is None or source.model() is other)
         for v, _ in branch.starts:
             assert v.model() is other
     for follower in theirs.followers:

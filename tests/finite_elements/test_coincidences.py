@@ -9,7 +9,7 @@ from pyomo.mpec import Complementarity
 
 import pyomo_fesd
 from pyomo_fesd.core import all_hints, moving_grids
-from pyomo_fesd.finite_elements.coincidences import switching_together
+from pyomo_fesd.finite_elements.changes import switching_together
 from tests.models import dcs
 from tests.problems import carried, events_together, kink_at_stage, two_experiments
 from tests.problems.running import move, transform

@@ -20,10 +20,14 @@ def branches(m):
     return {(b - 1, step): branch for (b, step), branch in zip(keys, found)}
 
 
+def moves(branch):
+    """The pairs that change, with those that they take over from, or None."""
+    return [couple for change in branch.changes for couple in (change.later if branch.later else change.earlier)]
+
+
 def pairs(branch):
-    """Indices of the pairs that change: with those that they take over from, or None."""
-    taken = [(pair.index(), source.index()) for pair, source in branch.takes_over]
-    return taken + [(pair.index(), None) for pair in branch.first_side_zero]
+    """Indices of ``moves``."""
+    return [(pair.index(), source and source.index()) for pair, source in moves(branch)]
 
 
 # What is written
@@ -65,8 +69,7 @@ def test_at_a_stage_boundary_the_element_starts_short_and_the_others_fill_the_st
 def test_with_hysteresis_the_law_of_switching_goes_along():
     m = carried.build()
     move(dcs(m, hysteresis=[m.zero]), 4, 2)
-    changing = [pair for pair, _ in branches(m)[2, 1].takes_over] + list(branches(m)[2, 1].first_side_zero)
-    components = {pair.parent_component().local_name for pair in changing if pair.ctype is Complementarity}
+    components = {pair.parent_component().local_name for pair, _ in moves(branches(m)[2, 1]) if pair.ctype is Complementarity}
     assert components == {'binary', 'parts', 'region', 'leaving'}
 
 

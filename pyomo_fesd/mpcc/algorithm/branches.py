@@ -8,9 +8,10 @@ from collections import Counter, deque
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.branch_solutions import FIRST, SECOND, BranchSolutions
+from pyomo_fesd.mpcc.algorithm.moves import differs, with_moves
 from pyomo_fesd.mpcc.algorithm.search import FEW, Verdict, exhaust, leaves
 from pyomo_fesd.mpcc.algorithm.state import Point
-from pyomo_fesd.mpcc.subproblems import G_ZERO, MATTERS, Stationarity
+from pyomo_fesd.mpcc.subproblems import MATTERS, ActiveSets, Stationarity
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
@@ -187,11 +188,10 @@ class Branches:
         if not (always or all(self._is_short(point, neighbour) for neighbour in neighbours)):
             return None
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)
-        zero = sets.zero.copy()
+        zero = sets.zero
         for neighbour in neighbours:
-            taken = zero[neighbour.sources]
-            zero[neighbour.ended] = G_ZERO
-            zero[neighbour.targets] = taken
+            now = ActiveSets(zero, sets.gamma)
+            zero = with_moves(zero, [change.moved(neighbour.later) for change in neighbour.changes if differs(change, now)])
         # the point lies on both sides of a bi-active pair already
         return zero if np.any((zero != sets.zero) & ~sets.gamma) else None
 

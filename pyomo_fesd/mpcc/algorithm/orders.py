@@ -18,7 +18,8 @@ import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.arrivals import Entered, branches
 from pyomo_fesd.mpcc.algorithm.insertions import AFTER, BEFORE, OrdersByInsertion
-from pyomo_fesd.mpcc.subproblems import G_ZERO, ActiveSets, Verdict
+from pyomo_fesd.mpcc.algorithm.moves import differs, is_alike, with_moves
+from pyomo_fesd.mpcc.subproblems import ActiveSets, Verdict
 
 #: A place nearer to its least extent than this may be none: NLP solvers leave it a little above its bound.
 NEAR_BOUND = 1e-4
@@ -104,13 +105,13 @@ class Orders:
         """Yield the orders of the changes that fall together at a point."""
         w, inserted = point.w, OrdersByInsertion(self._subsolves, point, sets)
         for coincidence, at in self._situations(w, sets):
-            present = [change for change in coincidence.changes if _differs(change, at)]
+            present = [change for change in coincidence.changes if differs(change, at)]
             for some in _subsets(present, coincidence.fixed):
                 rest = [change for change in present if change not in some]
                 moved = some if coincidence.fixed else rest
                 rows = [(AFTER, rest)], [(BEFORE, moved)]
                 judges = [partial(inserted.row, coincidence, row, present) for row in rows if at is sets]
-                later, earlier = _moved(at.zero, [c.later for c in some]), _moved(at.zero, [c.earlier for c in moved])
+                later, earlier = with_moves(at.zero, [c.later for c in some]), with_moves(at.zero, [c.earlier for c in moved])
                 later = _way(w, coincidence.later, later, coincidence.by_values_later, coincidence.beyond_later, at)
                 earlier = _way(w, coincidence.earlier, earlier, coincidence.by_values_earlier, coincidence.beyond_earlier, at)
                 after, before = (Inserted.of(coincidence, *row[0], present, at is not sets) for row in rows)
@@ -143,7 +144,7 @@ class Orders:
             beside = ((coincidence.later, by_earlier, 'earlier'), (coincidence.earlier, by_later, 'later'))
             for variable, others, direction in beside:
                 if variable in others and variable is not None and w[variable] <= self._c.lbx[variable] + NEAR_BOUND:
-                    zero = _moved(sets.zero, [getattr(change, direction) for change in others[variable].changes])
+                    zero = with_moves(sets.zero, [getattr(change, direction) for change in others[variable].changes])
                     yield coincidence, ActiveSets(zero, np.zeros(len(zero), dtype=bool))
 
 
@@ -169,20 +170,6 @@ def _longer(row, places):
             yield from _longer((*row, place), places)
 
 
-def _differs(change, sets):
-    """Whether a change is there; a bi-active or open pair lies on both sides of it already."""
-    undecided = sets.gamma | sets.open
-    clear = ~undecided[change.pairs] & ~undecided[change.partners]
-    happening = (sets.zero[change.happening] != G_ZERO) & ~undecided[change.happening]
-    return bool(happening.any() or np.any((sets.zero[change.pairs] != sets.zero[change.partners]) & clear))
-
-
-def _is_alike(change, sets):
-    """Whether nothing changes for certain."""
-    undecided = sets.gamma | sets.open
-    return not (_differs(change, sets) or undecided[change.pairs].any() or undecided[change.partners].any())
-
-
 def _subsets(changes, fixed):
     """The changes that come apart from the rest: each one alone, all but one, and all if the place itself matters."""
     single = [[change] for change in changes]
@@ -193,15 +180,6 @@ def _subsets(changes, fixed):
     return single if len(changes) > 1 else []
 
 
-def _moved(zero, moves):
-    """The zero sides after some changes have moved."""
-    found = zero.copy()
-    for move in moves:
-        found[move.ended] = G_ZERO
-        found[move.targets] = zero[move.sources]
-    return found
-
-
 def _way(w, variable, zero, by_values, beyond, sets):
     """The branch in which a place has no extent, or none where there is no such place."""
     if variable is None:
@@ -209,4 +187,4 @@ def _way(w, variable, zero, by_values, beyond, sets):
     # of the pairs that follow from values both sides are looked at where both are zero: a place that grows may have either
     clear = ~(sets.gamma | sets.open)[by_values.sources]
     zero[by_values.targets[clear]] = sets.zero[by_values.sources[clear]]
-    return [Entered(np.array([variable]), zero, w, by_values.targets, spares=_is_alike(beyond, sets))]
+    return [Entered(np.array([variable]), zero, w, by_values.targets, spares=is_alike(beyond, sets))]

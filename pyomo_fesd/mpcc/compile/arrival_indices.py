@@ -4,11 +4,18 @@ Takes: hints, with the positions of pairs and of variables by the id of a compon
 Leaves: the same by positions.
 """
 
-from itertools import count
+from itertools import chain, count
 
 import numpy as np
 
-from pyomo_fesd.mpcc.compile.hint_indices import ArrivalIndices, MoveIndices, OptionIndices, PlaceIndices, ToggleIndices
+from pyomo_fesd.mpcc.compile.hint_indices import (
+    ArrivalIndices,
+    ChangeIndices,
+    MoveIndices,
+    OptionIndices,
+    PlaceIndices,
+    ToggleIndices,
+)
 
 
 def arrival_indices(arrivals, pairs, columns) -> list[ArrivalIndices]:
@@ -22,6 +29,21 @@ def arrival_indices(arrivals, pairs, columns) -> list[ArrivalIndices]:
         options = [_option(option, numbers, pairs) for option in arrival.options]
         found.append(ArrivalIndices(rows[id(arrival.row)], tuple(t for t in toggles if t.pairs.size), tuple(options)))
     return found
+
+
+def changes_by_id(hints, pairs) -> dict[int, ChangeIndices]:
+    """Return the changes of neighbouring branches and coincidences by positions, by the id of each ``Change``."""
+    of_coincidences = [(*hint.changes, hint.beyond_later, hint.beyond_earlier) for hint in hints.coincidences]
+    several = chain([hint.changes for hint in hints.neighbour_branches], of_coincidences)
+    every = {id(change): change for changes in several for change in changes if change is not None}
+    return {key: _change(change, pairs) for key, change in every.items()}
+
+
+def _change(change, pairs):
+    differing = both_positions(change.differing, pairs)
+    return ChangeIndices(
+        *differing, moves(change.later, pairs), moves(change.earlier, pairs), positions_of(change.happening, pairs)
+    )
 
 
 def _place(place, pairs, columns):

@@ -11,10 +11,9 @@ import numpy as np
 from pyomo.core import maximize
 from scipy import sparse
 
-from pyomo_fesd.mpcc.compile.arrival_indices import arrival_indices, both_positions, moves, positions_of
+from pyomo_fesd.mpcc.compile.arrival_indices import arrival_indices, changes_by_id, moves, positions_of
 from pyomo_fesd.mpcc.compile.casadi_matrices import csr
 from pyomo_fesd.mpcc.compile.hint_indices import (
-    ChangeIndices,
     CoincidenceIndices,
     FillingIndices,
     FollowerIndices,
@@ -140,6 +139,7 @@ class _Assembly:
         scale, values = self._scale(factors), self._model_values(factors.x)
         sign = -1.0 if problem.objective is not None and problem.objective.sense == maximize else 1.0
         positions = _positions_of(rows.conditions), {id(v): [j] for j, v in enumerate(self._variables)}
+        changes = changes_by_id(hints, positions[0])
         data = MpccData(
             lbg=rows.lbg * scale.g,
             ubg=rows.ubg * scale.g,
@@ -148,8 +148,8 @@ class _Assembly:
             has_objective=problem.objective is not None,
             scale=scale,
             tentative=np.array([d.tentative for d in problem.decisions], dtype=bool),
-            neighbours=_neighbours(hints.neighbour_branches, *positions, scale.x),
-            coincidences=[_coincidence(hint, *positions) for hint in hints.coincidences],
+            neighbours=_neighbours(hints.neighbour_branches, changes, positions[1], scale.x),
+            coincidences=[_coincidence(hint, changes, *positions) for hint in hints.coincidences],
             arrivals=arrival_indices(hints.arrivals, *positions),
             parts=part_indices(hints.chains, positions[1]),
             followers=_followers(hints.followers, positions[0]),
@@ -210,10 +210,10 @@ def _positions_of(conditions):
     return pairs
 
 
-def _neighbours(branches, pairs, columns, s_x):
-    """The neighbouring branches by positions of pairs and variables, without those in which no pair takes over."""
-    found = (_neighbour(branch, pairs, columns, s_x) for branch in branches)
-    return [neighbour for neighbour in found if neighbour.targets.size]
+def _neighbours(branches, changes, columns, s_x):
+    """The neighbouring branches by positions of pairs and variables, without those in which no pair changes."""
+    found = (_neighbour(branch, changes, columns, s_x) for branch in branches)
+    return [neighbour for neighbour in found if any(change.moved(neighbour.later).targets.size for change in neighbour.changes)]
 
 
 def _followers(followers, pairs):
@@ -239,34 +239,23 @@ def _fillings(fillings, pairs, columns, s_x):
     return found
 
 
-def _neighbour(branch, pairs, columns, s_x):
-    """One of them; ``pairs`` and ``columns`` are positions by the id of a component, which need not have any."""
-    targets, sources = both_positions(branch.takes_over, pairs)
+def _neighbour(branch, changes, columns, s_x):
+    """One of them; ``columns`` are positions by the id of a component, which need not have any."""
     starts = {columns[id(v)][0]: start for v, start in branch.starts if id(v) in columns}
     at = np.array(list(starts), dtype=int)
     return NeighbourIndices(
-        targets,
-        sources,
-        ended=positions_of(branch.first_side_zero, pairs),
+        tuple(changes[id(change)] for change in branch.changes),
+        branch.later,
         short=positions_of(branch.if_at_lower_bound, columns),
         starts=at,
         at=np.array(list(starts.values()), dtype=float) * s_x[at],
     )
 
 
-def _coincidence(hint, pairs, columns):
-    changes = tuple(_change(change, pairs) for change in hint.changes)
+def _coincidence(hint, changes, pairs, columns):
+    present = tuple(changes[id(change)] for change in hint.changes)
     extents = hint.later, hint.earlier, hint.before, hint.after
     later, earlier, before, after = (None if v is None or id(v) not in columns else columns[id(v)][0] for v in extents)
-    beyond = (None if change is None else _change(change, pairs) for change in (hint.beyond_later, hint.beyond_earlier))
+    beyond = (None if change is None else changes[id(change)] for change in (hint.beyond_later, hint.beyond_earlier))
     by_values = (moves(some, pairs) for some in (hint.by_values_later, hint.by_values_earlier))
-    return CoincidenceIndices(changes, later, earlier, hint.fixed, before, after, *beyond, *by_values)
-
-
-def _change(change, pairs):
-    return ChangeIndices(
-        *both_positions(change.differing, pairs),
-        moves(change.later, pairs),
-        moves(change.earlier, pairs),
-        positions_of(change.happening, pairs),
-    )
+    return CoincidenceIndices(present, later, earlier, hint.fixed, before, after, *beyond, *by_values)

@@ -6,28 +6,6 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class NeighbourIndices:
-    """A ``NeighbourBranch`` by positions of pairs and variables.
-
-    Attributes
-    ----------
-    targets, sources : int arrays, pairs; the first get the zero sides of the second
-    ended : int array, pairs whose first side becomes zero
-    short : int array
-        variables; unless one of them is at its lower bound the branch is not tried (none: always)
-    starts : int array, variables that start elsewhere
-    at : array, their start values
-    """
-
-    targets: np.ndarray
-    sources: np.ndarray
-    ended: np.ndarray
-    short: np.ndarray
-    starts: np.ndarray
-    at: np.ndarray
-
-
-@dataclass(frozen=True)
 class MoveIndices:
     """Pairs that change if a change moves; ``targets`` get the zero sides of ``sources``, the first side of ``ended`` becomes 0."""
 
@@ -52,6 +30,31 @@ class ChangeIndices:
     later: MoveIndices
     earlier: MoveIndices
     happening: np.ndarray
+
+    def moved(self, later: bool) -> MoveIndices:
+        """The pairs that change if it comes later, or earlier."""
+        return self.later if later else self.earlier
+
+
+@dataclass(frozen=True, eq=False)
+class NeighbourIndices:
+    """A ``NeighbourBranch`` by positions of pairs and variables.
+
+    Attributes
+    ----------
+    changes : tuple of ChangeIndices
+    later : bool
+    short : int array
+        variables; unless one of them is at its lower bound the branch is not tried (none: always)
+    starts : int array, variables that start elsewhere
+    at : array, their start values
+    """
+
+    changes: tuple
+    later: bool
+    short: np.ndarray
+    starts: np.ndarray
+    at: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

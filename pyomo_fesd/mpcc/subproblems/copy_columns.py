@@ -57,8 +57,9 @@ class CopyColumns:
         place = {j: first + i for i, j in enumerate(part.own)}
         self._own, self.place_of_extent = frozenset(place), place[part.extent]
         # the boundary lies between the part and what a copy of it is inserted beside
-        self._begins = {j: j for j in part.first} if insertion.ahead else dict(zip(part.first, part.last))
-        at_boundary = dict(zip(part.first, part.last)) if insertion.ahead else {j: j for j in part.last}
+        follows = dict(zip(*parts.entry(insertion.k)))
+        self._begins = {j: j for j in follows} if insertion.ahead else follows
+        at_boundary = follows if insertion.ahead else {j: j for j in follows.values()}
         self.columns = {j: before.get(boundary, boundary) for j, boundary in self._begins.items()} | place
         self.passed_on = before | {j: place[last] for j, last in at_boundary.items() if last in place}
         self.ends = {j: place[j] for j in part.ends} if ends else {}

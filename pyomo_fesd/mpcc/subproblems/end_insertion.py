@@ -29,7 +29,7 @@ class EndInsertions:
 
     def verdict(self, w, sets, equal, order) -> Verdict:
         """Judge an ``EndInsertion`` into the point ``w`` with active sets ``sets`` and the decisions ``equal`` in force."""
-        if not all(self._parts.may_be_copied(k) and not self._parts.all[k].gate.size for k in (order.end, order.inner)):
+        if not all(self._may_be_inserted(k) for k in (order.end, order.inner)):
             return Verdict.NONE
         if not self._applies(w, sets, order):
             return Verdict.UNKNOWN
@@ -43,6 +43,9 @@ class EndInsertions:
                 lambda: [self._charge(w, sets, equal, order)],
                 self._tolerances.descent,
             )
+
+    def _may_be_inserted(self, k):
+        return self._parts.may_be_copied(k) and not self._parts.all[k].gate.size and not self._parts.hands_on(k)
 
     def _applies(self, w, sets, order):
         end, inner = (self._parts.all[k] for k in (order.end, order.inner))

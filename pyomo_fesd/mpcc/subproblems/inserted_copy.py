@@ -79,6 +79,8 @@ class Copy:
         self.part, self.rows = parts.all[insertion.k], np.flatnonzero(parts.of_row == insertion.k)
         self.own, self._inner = self.part.own, np.setdiff1d(self.part.own, [self.part.extent])
         self._equations = InsertedPart(c, sides, parts, self._inner, self.rows, insertion.zero)
+        # with which the part begins, and what takes its place at its end
+        self._before_it, self._at_end = parts.entry(insertion.k)
         self._at, self.limit = [], None
 
     def solve(self, w, guesses, size=None) -> bool:
@@ -107,8 +109,8 @@ class Copy:
 
     def after(self, w):
         """The point ``w`` with the values at the boundary that the copy has at its end."""
-        part, found = self.part, w.copy()
-        found[part.first if self._insertion.ahead else part.last] = self.limit[part.last]
+        found = w.copy()
+        found[self._before_it if self._insertion.ahead else self._at_end] = self.limit[self._at_end]
         return found
 
     @property
@@ -120,7 +122,7 @@ class Copy:
         """Values of part ``guess``, its last ones those with which the copy begins."""
         part, start = self.part, w.copy()
         if not self._insertion.ahead:
-            start[part.first] = w[part.last]
+            start[self._before_it] = w[self._at_end]
         given = self._parts.all[guess].own
         if len(given) == len(part.own):
             start[part.own] = w[given]
@@ -220,8 +222,8 @@ class Copy:
         found[self.part.extent] = 0.0
         if self._insertion.ahead:
             return found
-        found[self.part.first] = 0.0
-        found[self.part.last] = slopes[self.part.first]
+        found[self._before_it] = 0.0
+        found[self._at_end] = slopes[self._before_it]
         return found
 
     def _missed(self, w):

@@ -113,7 +113,7 @@ class Insertions:
     def _applies(self, w, insertion, grows):
         k, part = insertion.k, self._parts.all[insertion.k]
         # the copy of a part whose first values are given begins with them
-        begins = part.whole or (part.alike and insertion.ahead and not grows)
+        begins = self._parts.is_whole(k) or (part.alike and insertion.ahead and not grows)
         return begins and not (self._parts.ends_with_pairs(k) or self._parts.is_beside_a_short_one(w, k))
 
     @staticmethod
@@ -144,9 +144,9 @@ class Insertions:
         following = self._following(insertion)
         if following == AFTER_LAST:
             return w
-        first, gate = self._parts.all[following].first, self._parts.all[following].gate
+        (first, last), gate = self._parts.entry(following), self._parts.all[following].gate
         w = w.copy()
-        w[first] = copy.limit[copy.part.last if insertion.ahead else first]
+        w[first] = copy.limit[last if insertion.ahead else first]
         changed = (insertion.zero_beside != present) & self._parts.in_gate & (self._parts.of_pair == following)
         if not changed.any():
             return w

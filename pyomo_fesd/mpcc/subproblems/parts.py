@@ -1,7 +1,11 @@
 """Which rows and pairs of a compiled MPCC belong to which of its parts.
 
-A row belongs to a part if it contains variables of the part, and besides them only the last values of the part before and variables
-that belong to no part.  A row with variables of more parts is shared.  The sides of a pair belong to the same part.
+A row belongs to a part if it contains variables of the part, and besides them only last values of the part before, what that one
+hands on, and variables that belong to no part.  A row with variables of more parts is shared.  The sides of a pair belong to the
+same part.
+
+A part hands on a quantity inside it if a row of every next part contains that of the part before it, but not the extent of that
+part: as forces do of which depends how the next element begins.
 
 Takes: a compiled MPCC with ``parts``, and the pattern of its Jacobians.
 Leaves: numbers of parts by variable, row and pair.
@@ -79,6 +83,65 @@ class Parts:
         return found
 
     @cached_property
+    def is_handed_on(self):
+        """Whether a variable (n) is handed on to the next part, beside the last values."""
+        found = np.zeros(len(self._c.x0), dtype=bool)
+        for part in self.all:
+            places = part.places[self._handed_on[part.chain]]
+            found[places[places >= 0]] = True
+        return found
+
+    def entry(self, k):
+        """Variables of the part before part ``k`` with which this one begins, and those of its own that follow them."""
+        part, before = self.all[k], self.previous(k)
+        places = self._handed_on[part.chain]
+        if before is None or not len(places):
+            return part.first, part.last
+        handed_on, own = self.all[before].places[places], part.places[places]
+        free = (handed_on >= 0) & (own >= 0)
+        return np.append(part.first, handed_on[free]), np.append(part.last, own[free])
+
+    def is_whole(self, k):
+        """Whether all with which part ``k`` begins and ends is free."""
+        part, before = self.all[k], self.previous(k)
+        places = self._handed_on[part.chain]
+        if not part.whole or not len(places):
+            return part.whole
+        return before is not None and bool((self.all[before].places[places] >= 0).all() and (part.places[places] >= 0).all())
+
+    def hands_on(self, k):
+        """Whether parts of the chain of part ``k`` hand on more than their last values."""
+        return bool(len(self._handed_on[self.all[k].chain]))
+
+    @cached_property
+    def _handed_on(self):
+        """By chain, the places among the variables of a part that are handed on; where one is given, rows need not contain it."""
+        found = {part.chain: set() for part in self.all}
+        for part, read in zip(self.all, self._read_before):
+            found[part.chain] |= read
+        for k, (part, read) in enumerate(zip(self.all, self._read_before)):
+            before = self.previous(k)
+            if before is not None:
+                found[part.chain] -= {place for place in found[part.chain] - read if self.all[before].places[place] >= 0}
+        return {chain: np.array(sorted(places), dtype=int) for chain, places in found.items()}
+
+    @cached_property
+    def _read_before(self):
+        """For each part, the places inside the part before it that its rows contain."""
+        pattern, found = self.pattern, [set() for _ in self.all]
+        places = np.full(len(self._c.x0), NONE)
+        for part in self.all:
+            places[part.places[part.places >= 0]] = np.flatnonzero(part.places >= 0)
+            places[part.extent] = NONE
+        for columns in np.split(pattern.indices, pattern.indptr[1:-1]):
+            one, other = self._adjacent(columns)
+            if other is not None:
+                inner = columns[(self.of_variable[columns] == one) & ~self.is_last[columns]]
+                if (places[inner] >= 0).all():
+                    found[other].update(places[inner].tolist())
+        return found
+
+    @cached_property
     def pattern(self):
         """Ones where a row contains a variable."""
         J = self._c.stacked_jacobian(self._c.x0)
@@ -116,16 +179,21 @@ class Parts:
         m, q = len(self._c.lbg), self._c.pairs
         pattern = self.pattern
         inner = self.of_variable >= 0
-        inner[self.is_gate | self.is_last] = False
+        inner[self.is_gate | self._is_read_after] = False
         inner[[part.extent for part in self.all]] = False
         counts = pattern @ inner.astype(float)
-        own_last = self._with_own_last(pattern)
-        return (counts[m : m + q] + counts[m + q : m + 2 * q] == 0) & ~(own_last[m : m + q] | own_last[m + q : m + 2 * q])
+        own = self._with_own_read_after(pattern)
+        return (counts[m : m + q] + counts[m + q : m + 2 * q] == 0) & ~(own[m : m + q] | own[m + q : m + 2 * q])
 
-    def _with_own_last(self, pattern):
-        """Whether a row contains last values of the part that it belongs to."""
+    @cached_property
+    def _is_read_after(self):
+        """Whether rows of the next part may contain a variable (n)."""
+        return self.is_last | self.is_handed_on
+
+    def _with_own_read_after(self, pattern):
+        """Whether a row contains, of the part that it belongs to, what those of the next one may contain."""
         entries = pattern.tocoo()
-        hit = self.is_last[entries.col] & (self.of_variable[entries.col] == self.of_row[entries.row])
+        hit = self._is_read_after[entries.col] & (self.of_variable[entries.col] == self.of_row[entries.row])
         found = np.zeros(pattern.shape[0], dtype=bool)
         found[entries.row[hit]] = True
         return found
@@ -135,6 +203,11 @@ class Parts:
         parts = np.unique(owners[owners >= 0])
         if len(parts) < 2:
             return parts[0] if len(parts) else NONE
-        one, other = parts[-2:]
-        adjacent = len(parts) == 2 and self.next(one) == other
-        return other if adjacent and self.is_last[columns[owners == one]].all() else SHARED
+        one, other = self._adjacent(columns)
+        return SHARED if other is None or not self._is_read_after[columns[owners == one]].all() else other
+
+    def _adjacent(self, columns):
+        """The two parts of variables ``columns`` that are of two parts, one after the other; else (None, None)."""
+        parts = np.unique(self.of_variable[columns])
+        parts = parts[parts >= 0].tolist()
+        return parts if len(parts) == 2 and self.next(parts[0]) == parts[1] else (None, None)

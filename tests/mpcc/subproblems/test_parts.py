@@ -1,4 +1,4 @@
-"""Which rows and pairs belong to which part, for two chains of parts written by hand."""
+"""Which rows and pairs belong to which part, for chains of parts written by hand."""
 
 from types import SimpleNamespace
 
@@ -12,21 +12,22 @@ from pyomo_fesd.mpcc.subproblems.parts import NONE, SHARED, Parts
 #: Variables: 0 belongs to no part; each part has its extent, a gate, an inner and a last variable.
 PARTS = [range(1, 5), range(5, 9), range(9, 13)]
 #: Columns of the rows and of both sides of the pairs, and the part of each.
-ROWS = [([0], NONE), ([0, 3, 4], 0), ([0, 4, 7, 8], 1), ([3, 7], SHARED), ([1, 5, 9], SHARED), ([8, 11], SHARED), ([11, 12], 2)]
+ROWS = [([0], NONE), ([0, 3, 4], 0), ([0, 4, 7, 8], 1), ([1, 3, 7], SHARED), ([1, 5, 9], SHARED), ([8, 11], SHARED), ([11, 12], 2)]
 PAIRS = [([6], [4, 6], 1, True), ([7], [8], 1, False), ([6], [0], 1, True), ([10], [8], SHARED, True), ([2], [4], 0, False)]
 
 
-def of_hand():
-    """Parts 0 and 1 follow one another; part 2 is a chain of its own."""
-    parts, places = [], [(0, 0), (0, 1), (1, 0)]
-    for own, before, place in zip(PARTS, (0, 4, 0), places):
+def of_hand(rows=ROWS, places=((0, 0), (0, 1), (1, 0))):
+    """Parts at these places: the number of a chain, and that in the chain."""
+    parts = []
+    for own, (chain, number) in zip(PARTS, places):
         own, gate, last = np.array(own), np.array(own[1:2]), np.array(own[3:])
-        parts.append(PartIndices(own[0], own, gate, own, np.array([before]), last, last, *place, True, True, True))
-    columns = [row for row, _ in ROWS] + [first for first, *_ in PAIRS] + [second for _, second, *_ in PAIRS]
+        before = np.array([own[0] - 1 if number else 0])
+        parts.append(PartIndices(own[0], own, gate, own.copy(), before, last, last, chain, number, True, True, True))
+    columns = [row for row, _ in rows] + [first for first, *_ in PAIRS] + [second for _, second, *_ in PAIRS]
     J = np.zeros((len(columns), 13))
     for row, entries in zip(J, columns):
         row[entries] = 1.0
-    c = SimpleNamespace(parts=parts, x0=np.zeros(13), lbg=np.zeros(len(ROWS)), pairs=len(PAIRS))
+    c = SimpleNamespace(parts=parts, x0=np.zeros(13), lbg=np.zeros(len(rows)), pairs=len(PAIRS))
     c.stacked_jacobian = lambda w: sparse.csr_matrix(J)
     return Parts(c)
 
@@ -52,3 +53,28 @@ def test_parts_of_one_chain_follow_one_another():
     assert [parts.next(k) for k in range(3)] == [1, None, None]
     assert [parts.previous(k) for k in range(3)] == [None, 0, None]
     assert [parts.beside(k) for k in range(3)] == [(1,), (0,), ()]
+
+
+# What a part hands on: its inner variable, which rows of the next part contain
+
+ONE_CHAIN = (0, 0), (0, 1), (0, 2)
+
+
+def test_what_rows_of_every_next_part_contain_is_handed_on():
+    parts = of_hand([([3, 7], 1), ([7, 8, 11], 2)], ONE_CHAIN)
+    assert parts.of_row[:2].tolist() == [1, 2] and np.flatnonzero(parts.is_handed_on).tolist() == [3, 7, 11]
+    assert [part.tolist() for part in parts.entry(1)] == [[4, 3], [8, 7]]
+    assert [parts.is_whole(k) for k in range(3)] == [False, True, True] and parts.hands_on(0)
+
+
+def test_what_rows_of_one_part_alone_contain_is_not():
+    parts = of_hand([([3, 7], SHARED), ([8, 11], 2)], ONE_CHAIN)
+    assert parts.of_row[:2].tolist() == [SHARED, 2] and not parts.is_handed_on.any()
+    assert [part.tolist() for part in parts.entry(1)] == [[4], [8]] and parts.is_whole(0) and not parts.hands_on(0)
+
+
+def test_what_is_given_in_the_part_before_is_not_followed():
+    parts = of_hand([([7], 1), ([7, 11], 2)], ONE_CHAIN)
+    parts.all[0].places[2] = NONE
+    assert parts.of_row[:2].tolist() == [1, 2] and [part.tolist() for part in parts.entry(2)] == [[8, 7], [12, 11]]
+    assert [parts.is_whole(k) for k in range(3)] == [False, False, True]
