@@ -21,7 +21,7 @@ def clock(m, kind, length, speeds):
     if kind == 'speed':
         m.speed = pyo.Var(m.t, initialize=1, bounds=speeds)
         return {'extra': [m.speed]}
-    m.speed = pyo.Param(m.t, initialize=1)
+    m.speed = pyo.Param(m.t, default=1)
     stages = pyo.RangeSet(len(m.t) - 1)
     m.stage_length = pyo.Var(stages, initialize=length, bounds=(max(1e-3, speeds[0]) * length, speeds[1] * length))
     return {'stage_lengths': m.stage_length}

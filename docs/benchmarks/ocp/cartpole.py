@@ -14,6 +14,7 @@ from math import pi
 import numpy as np
 import pyomo.dae as dae
 import pyomo.environ as pyo
+from benchmarks.ocp import replay
 from benchmarks.ocp.discretisation import moving_grid
 
 HORIZON, STAGES, ELEMENTS, NCP = 5.0, 20, 2, 2
@@ -66,6 +67,28 @@ def discretise(m, elements=ELEMENTS, ncp=NCP, scheme='LAGRANGE-RADAU'):
     """Apply ``fesd.dcs`` and the moving grid, with ``elements`` elements in each control stage."""
     pyo.TransformationFactory('fesd.dcs').apply_to(m)
     return moving_grid(m, elements, ncp, scheme)
+
+
+def plant(x, u):
+    """For ``replay``: the friction and the rate of the cost."""
+    _, theta, v, w = x
+    coupling = M2 * LENGTH * np.cos(theta)
+    accelerations = np.linalg.inv([[M1 + M2, coupling], [coupling, M2 * LENGTH**2]])
+    forces = np.array([u[0] + M2 * LENGTH * w**2 * np.sin(theta), -M2 * G * LENGTH * np.sin(theta)])
+    f = np.array([v, w, *accelerations @ forces])
+    g = np.array([0, 0, *-F * accelerations[:, 0]])[:, np.newaxis]
+    return f, g, np.array([v]), np.eye(4)[[2]], distance(RUNNING, x) + u[0] ** 2
+
+
+def replay_controls(controls, lengths):
+    """State at the end of these controls, and their true cost."""
+    end, running = replay.replay(plant, START, controls, lengths)
+    return end, running + distance(FINAL, end)
+
+
+def missed(x):
+    """Distance of the final place and angle to the goal, which the cost weighs."""
+    return float(np.abs(x - GOAL)[:2].max())
 
 
 def with_nosnoc(stages=STAGES, elements=ELEMENTS, ncp=NCP, scheme='RADAU', u=None, **settings):

@@ -7,9 +7,12 @@
 Units: m, s, N, A, V.  Source: Christiansen, Maurer, Zirn (2008); problem 'motor with friction' of NOSNOC.
 """
 
+from functools import partial
+
 import numpy as np
 import pyomo.dae as dae
 import pyomo.environ as pyo
+from benchmarks.ocp import replay
 from benchmarks.ocp.discretisation import moving_grid
 
 HORIZON, STAGES, ELEMENTS, NCP = 0.08, 30, 2, 2
@@ -61,6 +64,9 @@ def plant(x, u):
     f = np.array([v1, (spring + K_F * current) / M1, v2, -spring / M2, (u[0] - R * current - K_S * v1) / L])
     along = np.eye(5)[[1]]
     return f, -F_R / M1 * along.T, np.array([v1]), along, u[0] ** 2
+
+
+replay_controls = partial(replay.replay, plant, START)
 
 
 def missed(x):

@@ -4,7 +4,7 @@ nosnoc adds a penalty on the element lengths to the objective that it reports; t
 quadrature of the scheme.
 """
 
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 from benchmarks.common import nosnoc_peer
@@ -19,24 +19,27 @@ def options(horizon, stages, elements, ncp, scheme='RADAU', **settings):
 def solve(model, ocp, opts, u=None):
     """Build and solve; ``u`` holds initial values of the controls by stage.
 
-    Returns a dict: ``build`` and ``solve`` in s, ``iterations`` over the ``nlps``, ``objective``, ``status`` as nosnoc reports it
-    (that of the last NLP), ``residual`` of complementarity, ``x_end``, the controls ``u`` by stage and the element lengths ``h``.
+    Returns a dict: ``build`` and ``solve`` in s, ``cpu`` of both, ``iterations`` over the ``nlps``, ``objective``, ``status`` as
+    nosnoc reports it (that of the last NLP), ``residual`` of complementarity, ``x_end``, the states ``x`` at the ends of the
+    elements, the controls ``u`` by stage and the element lengths ``h``.
     """
-    started = perf_counter()
+    started, cpu = perf_counter(), process_time()
     solver = NosnocSolver(opts, model, ocp)
     if u is not None:
         solver.set('u', np.reshape(u, np.shape(solver.problem.ind_u)))
     built = perf_counter()
     results = solver.solve()
-    solved = perf_counter()
+    solved, cpu = perf_counter(), process_time() - cpu
     problem, w = solver.problem, results['w_sol']
     return {
         'build': built - started,
         'solve': solved - built,
+        'cpu': cpu,
         'objective': objective(problem, w),
         'residual': float(problem.comp_res(w, solver.p_val)),
         'status': results['status'].name,
         'x_end': results['x_out'],
+        'x': results['x_list'],
         'u': np.array(results['u_list']),
         'h': np.array(results['time_steps']),
     } | nosnoc_peer.work(results)

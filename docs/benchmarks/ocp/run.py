@@ -3,9 +3,10 @@
     .venv/bin/pip install nosnoc==0.2.0
     .venv/bin/python docs/benchmarks/ocp/run.py [--only sliding,motor] [--fresh] [--limit 120] [--summary]
 
-Same control stages, elements and collocation points.  For each problem and method (1) times: three runs from the model's own
-initial values, each in a process of its own, from the model to the solution, without imports; (2) starts: ten random controls, the
-same for both.  Writes rows.csv, one row a run, summary.csv and summary.png beside this file; runs that have a row are skipped.
+Same control stages, elements and collocation points.  Eleven starts of each problem: the model's own initial values (start 0), and
+ten random controls, the same for both methods.  The controls that a run finds are replayed on the plant, with located events, which
+gives their true cost.  Writes rows.csv, one row a run, summary.csv and summary.png beside this file; runs that have a row are
+skipped.
 """
 
 import argparse
@@ -20,13 +21,16 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 from benchmarks.common.processes import json_lines
 from benchmarks.common.rows import Rows
-from benchmarks.ocp import replay, summary
+from benchmarks.ocp import summary
 
 HERE = Path(__file__).parent
 METHODS = ('pyomo_fesd', 'nosnoc')
-REPEATS, STARTS, SEED = 3, 10, 1
-KEY = ('problem', 'method', 'run', 'number')
-COLUMNS = (*KEY, 'status', 'certified', 'seconds', 'iterations', 'nlps', 'objective', 'off', 'missed')
+#: Number of random starts.
+STARTS, SEED = 10, 1
+KEY = ('problem', 'method', 'start')
+OF_SOLUTION = ('status', 'certified', 'seconds', 'cpu', 'iterations', 'nlps', 'objective', 'off')
+OF_REPLAY = ('replayed', 'off replayed', 'missed', 'status of replay')
+COLUMNS = (*KEY, *OF_SOLUTION, *OF_REPLAY)
 
 
 def module(problem):
@@ -44,29 +48,34 @@ def random_controls(problem, number):
 
 
 def with_pyomo_fesd(p, controls, limit):
-    """Build, discretise and solve at the defaults; return the row and the controls by stage."""
+    """Build, discretise and solve at the defaults; return the row, the controls by stage, and the lengths of the stages."""
     import pyomo.environ as pyo
 
     import pyomo_fesd  # noqa: F401
 
-    started = time.perf_counter()
+    started, cpu = time.perf_counter(), time.process_time()
     m = p.build()
     ends = sorted(m.t)[1:]
     p.discretise(m)
     if controls is not None:
         initialise(m, ends, controls)
     results = pyo.SolverFactory('mpec_hybrid').solve(m, time_limit=limit)
-    seconds = time.perf_counter() - started
+    spent = {'seconds': time.perf_counter() - started, 'cpu': time.process_time() - cpu}
     (objective,) = m.component_data_objects(pyo.Objective, active=True)
     used = [[pyo.value(v) for v in _controls_at(m, end)] for end in ends]
     return {
         'status': str(results.solver.termination_condition),
         'certified': str(results.solver.stationarity) == 'B',
-        'seconds': seconds,
+        **spent,
         'iterations': int(results.solver.nlp_iterations),
         'nlps': int(results.solver.nlps),
         'objective': pyo.value(objective),
-    }, used
+    }, (used, equal_lengths(p, m.T.value if hasattr(m, 'T') else p.HORIZON))
+
+
+def equal_lengths(p, duration):
+    """Lengths of the control stages."""
+    return np.full(p.STAGES, duration / p.STAGES)
 
 
 def initialise(m, ends, controls):
@@ -82,7 +91,7 @@ def _controls_at(m, t):
 
 
 def with_nosnoc(p, controls, limit):
-    """Solve the twin at nosnoc's defaults; return the row and the controls by stage."""
+    """Solve the twin at nosnoc's defaults; return the row, the controls by stage, and the lengths of the stages."""
     import nosnoc  # noqa: F401
 
     found = p.with_nosnoc(u=controls)
@@ -90,62 +99,65 @@ def with_nosnoc(p, controls, limit):
         'status': found['status'],
         'certified': '',
         'seconds': found['build'] + found['solve'],
+        'cpu': found['cpu'],
         'iterations': found['iterations'],
         'nlps': found['nlps'],
         'objective': float(found['objective']),
-    }, found['u']
+    }, (found['u'], found['lengths'] if 'lengths' in found else equal_lengths(p, p.HORIZON))
 
 
 SOLVERS = {'pyomo_fesd': with_pyomo_fesd, 'nosnoc': with_nosnoc}
 
 
-def measure(problem, method, run, number, limit):
+def measure(problem, method, start, limit):
     """One row."""
     p = module(problem)
-    row = dict(zip(KEY, (problem, method, run, number)))
+    row = dict(zip(KEY, (problem, method, start)))
     try:
-        found, used = SOLVERS[method](p, random_controls(problem, number if run == 'start' else 0), limit)
+        found, used = SOLVERS[method](p, random_controls(problem, start), limit)
     except Exception as error:
         return row | {'status': f'{type(error).__name__}: {error}'[:100]}
-    return row | found | {'off': found['objective'] / p.REFERENCE - 1, 'missed': replayed(p, used)}
+    return row | found | {'off': found['objective'] / p.REFERENCE - 1} | replayed(p, *used)
 
 
-def replayed(p, used):
-    """Distance to the goal at which the plant ends with these controls; empty for a problem without a goal."""
-    if not hasattr(p, 'plant'):
-        return ''
+def replayed(p, controls, lengths):
+    """The true cost of controls, and the distance to the goal, if there is one, at which the plant ends."""
     try:
-        end, _ = replay.replay(p.plant, p.START, used, np.full(p.STAGES, p.HORIZON / p.STAGES))
+        end, cost = p.replay_controls(controls, lengths)
     except RuntimeError as error:
-        return str(error)
-    return p.missed(end)
-
-
-def batches(problem, method):
-    """(run, numbers) of each process: a process for each timed run, and one for all starts."""
-    if method == 'nosnoc' and module(problem).with_nosnoc is None:
-        return []
-    starts = [('start', range(1, STARTS + 1))] if hasattr(module(problem), 'U_RANGE') else []
-    return [('time', [k]) for k in range(REPEATS)] + starts
+        return {'status of replay': str(error)}
+    missed = '' if p.missed is None else p.missed(end)
+    return {'replayed': float(cost), 'off replayed': float(cost / p.REFERENCE - 1), 'missed': missed, 'status of replay': 'ok'}
 
 
 def study(problems, limit, fresh):
-    """Measure the missing rows."""
+    """Measure the missing rows, with a process for each problem and method."""
     rows = Rows(HERE / 'rows.csv', KEY, COLUMNS, digits=12, fresh=fresh)
     for problem in problems:
         for method in METHODS:
-            for run, numbers in batches(problem, method):
-                missing = [k for k in numbers if (problem, method, run, k) not in rows]
-                if missing:
-                    _run_batch(rows, (problem, method, run), missing, limit)
+            missing = [k for k in range(STARTS + 1) if (problem, method, k) not in rows]
+            if missing and states(problem, method):
+                _run_batch(rows, (problem, method), missing, limit)
 
 
-def _run_batch(rows, batch, numbers, limit):
+def states(problem, method):
+    """Whether the method can state the problem."""
+    return method == 'pyomo_fesd' or module(problem).with_nosnoc is not None
+
+
+def print_rows(problem, method, starts, limit):
+    """Print one line of JSON for each start, after a run that loads everything and is not counted."""
+    measure(problem, method, 0, limit)
+    for k in starts:
+        print(json.dumps(measure(problem, method, k, limit), default=float), flush=True)
+
+
+def _run_batch(rows, batch, starts, limit):
     """Run in a process of its own; runs that it does not reach get its status."""
-    arguments = ('--child', *batch, ','.join(map(str, numbers)), '--limit', limit)
-    lines, status = json_lines(__file__, *arguments, limit=limit * len(numbers) + 60)
-    found = {row['number']: row for row in lines}
-    for k in numbers:
+    arguments = ('--child', *batch, ','.join(map(str, starts)), '--limit', limit)
+    lines, status = json_lines(__file__, *arguments, limit=limit * (len(starts) + 1) + 60)
+    found = {row['start']: row for row in lines}
+    for k in starts:
         row = found.get(k) or dict(zip(KEY, (*batch, k))) | {'status': status}
         rows.add(row)
         print(' '.join(str(round(v, 5) if isinstance(v, float) else v) for v in row.values()), flush=True)
@@ -158,12 +170,11 @@ def main():
     parser.add_argument('--fresh', action='store_true', help="delete the existing rows first")
     parser.add_argument('--limit', type=float, default=120, help="seconds for each run")
     parser.add_argument('--summary', action='store_true', help="run nothing")
-    parser.add_argument('--child', nargs=4, help=argparse.SUPPRESS)
+    parser.add_argument('--child', nargs=3, help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     if chosen.child:
-        problem, method, run, numbers = chosen.child
-        for k in map(int, numbers.split(',')):
-            print(json.dumps(measure(problem, method, run, k, chosen.limit), default=float), flush=True)
+        problem, method, starts = chosen.child
+        print_rows(problem, method, [int(k) for k in starts.split(',')], chosen.limit)
         return
     if not chosen.summary:
         study(chosen.only, chosen.limit, chosen.fresh)

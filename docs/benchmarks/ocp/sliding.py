@@ -7,11 +7,13 @@ From q = (2 pi/3, pi/3), v = 0 to q = (-pi/6, -pi/4) at T = 4 with min int |v|^2
 Source: problem 'sliding mode OCP' of NOSNOC.
 """
 
+from functools import partial
 from math import pi
 
 import numpy as np
 import pyomo.dae as dae
 import pyomo.environ as pyo
+from benchmarks.ocp import replay
 from benchmarks.ocp.discretisation import moving_grid
 
 HORIZON, STAGES, ELEMENTS, NCP = 4.0, 6, 6, 2
@@ -67,6 +69,9 @@ def plant(x, u):
     surfaces = np.array([q1 + 0.15 * q2**2, q2 - 0.05 * q1**3])
     gradients = np.array([[1, 0.3 * q2, 0, 0], [-0.15 * q1**2, 1, 0, 0]])
     return f, g, surfaces, gradients, v1**2 + v2**2
+
+
+replay_controls = partial(replay.replay, plant, START)
 
 
 def missed(x):

@@ -1,5 +1,7 @@
 """Table and picture of the optimal control study from its rows."""
 
+from itertools import product
+
 import pandas as pd
 from matplotlib.figure import Figure
 
@@ -7,58 +9,83 @@ PROBLEMS = ('sliding', 'motor', 'cartpole', 'tank', 'gearbox', 'ellipse')
 #: A run has found the reference minimum if its objective is this near, relative; the rest is the error of the grid.
 SAME = 0.03
 STYLE = {'pyomo_fesd': {'color': '0.15', 'hatch': ''}, 'nosnoc': {'color': '0.75', 'hatch': '//'}}
+#: Status of a solution, of both methods.
+SOLVED = ('optimal', 'SUCCESS')
+MEDIANS = ('objective', 'off', 'replayed', 'off replayed', 'missed', 'iterations', 'nlps', 'cpu')
+DIGITS = 6
+#: Smaller distances from the reference are drawn at this one.
+SMALLEST = 1e-10
 
 
 def summary(rows):
-    """One row for each problem and method: medians of the timed runs, and the share of starts that end at the reference."""
-    rows = rows.assign(reached=(rows.off.abs() <= SAME))
-    timed, starts = rows[rows.run == 'time'], rows[rows.run == 'start']
-    table = timed.groupby(['problem', 'method']).agg(
-        seconds=('seconds', 'median'),
-        iterations=('iterations', 'median'),
-        nlps=('nlps', 'median'),
-        status=('status', 'first'),
-        certified=('certified', 'first'),
-        objective=('objective', 'first'),
-        off=('off', 'first'),
-        missed=('missed', 'first'),
-    )
-    table['starts'] = starts.groupby(['problem', 'method']).size()
-    table['starts at the reference'] = starts.groupby(['problem', 'method']).reached.sum()
-    ours = table.seconds.xs('pyomo_fesd', level='method')
-    table['time / ours'] = table.seconds / ours.reindex(table.index.get_level_values('problem')).to_numpy()
-    table = table.reindex(pd.MultiIndex.from_product([PROBLEMS, STYLE], names=table.index.names)).dropna(how='all')
-    return table.map(lambda value: float(f'{value:.6g}') if isinstance(value, float) else value)
+    """One row for each problem and method: numbers of starts, and medians over the starts."""
+    of_run = {
+        'solved': rows.status.isin(SOLVED),
+        'certified': rows.certified.eq(True),
+        'at the reference': rows.off.abs().le(SAME) & rows.status.isin(SOLVED),
+    }
+    groups = rows.assign(**of_run).groupby(['problem', 'method'])
+    table = groups.size().to_frame('starts').join(groups[list(of_run)].sum()).join(groups[list(MEDIANS)].median())
+    # nosnoc does not certify
+    table['certified'] = table.certified.astype('Int64').where(table.index.get_level_values('method') != 'nosnoc')
+    table['cpu / nosnoc'] = ratio(table.cpu, 'nosnoc')
+    table = table.map(lambda value: float(f'{value:.{DIGITS}g}') if isinstance(value, float) else value)
+    return table.loc[[key for key in product(PROBLEMS, STYLE) if key in table.index]]
 
 
-def draw(table):
-    """Time as a ratio to ours, and the share of starts at the reference."""
-    figure = Figure(figsize=(9, 4), layout='constrained')
-    left, right = figure.subplots(1, 2, sharey=True)
+def ratio(cpu, method):
+    """CPU times as ratios to those of a method."""
+    base = cpu[cpu.index.get_level_values('method') == method].droplevel('method')
+    return cpu / base.reindex(cpu.index.get_level_values('problem')).to_numpy()
+
+
+def draw(rows, table):
+    """CPU time as a ratio to ours, the share of starts at the reference, and the replayed cost of each start."""
+    figure = Figure(figsize=(11, 4), layout='constrained')
+    cpu, share, cost = figure.subplots(1, 3, sharey=True)
     problems = list(dict.fromkeys(table.index.get_level_values('problem')))
     for k, (method, style) in enumerate(STYLE.items()):
+        heights = pd.Series([row - 0.2 + 0.4 * k for row in range(len(problems))], index=problems)
         part = table.xs(method, level='method').reindex(problems)
-        heights = [row - 0.2 + 0.4 * k for row in range(len(problems))]
-        bars = left.barh(heights, part['time / ours'].fillna(0), 0.38, edgecolor='0.15', label=method, **style)
-        left.bar_label(bars, [f' {s:.2f} s' if s == s else ' cannot state it' for s in part.seconds], fontsize='small')
-        share = part['starts at the reference'] / part['starts']
-        bars = right.barh(heights, share.fillna(0), 0.38, edgecolor='0.15', **style)
-        labels = [f' {n:.0f} of {of:.0f}' if of == of else '' for n, of in zip(part['starts at the reference'], part['starts'])]
-        right.bar_label(bars, labels, fontsize='small')
-    left.set_yticks(range(len(problems)), problems)
-    left.invert_yaxis()
-    left.set_xlabel('total time, as a ratio to pyomo_fesd')
-    right.set_xlabel('random starts that end at the reference')
-    for axis in (left, right):
-        axis.set_xlim(right=1.25 * axis.get_xlim()[1])
+        _draw_cpu(cpu, heights, part.cpu, ratio(table.cpu, 'pyomo_fesd').xs(method, level='method').reindex(problems), method)
+        _draw_share(share, heights, part['at the reference'], part['starts'], style)
+        _draw_cost(cost, heights, rows[rows.method == method], style)
+    cpu.set_yticks(range(len(problems)), problems)
+    cpu.invert_yaxis()
+    cpu.set_xlabel('median CPU time, as a ratio to pyomo_fesd')
+    cpu.set_xlim(right=1.25 * cpu.get_xlim()[1])
+    cpu.legend()
+    share.set_xlabel('share of starts at the reference')
+    share.set_xticks([0, 0.5, 1])
+    share.set_xlim(right=1.3)
+    cost.set_xlabel('replayed cost, distance from the reference')
+    cost.set_xscale('log')
+    cost.grid(axis='x', color='0.9')
+    cost.set_axisbelow(True)
+    for axis in (cpu, share, cost):
         axis.spines[['top', 'right']].set_visible(False)
-    left.legend()
     return figure
+
+
+def _draw_cpu(axis, heights, cpu, ratios, method):
+    bars = axis.barh(heights, ratios.fillna(0), 0.38, edgecolor='0.15', label=method, **STYLE[method])
+    axis.bar_label(bars, [f' {s:.2f} s' if s == s else ' cannot state it' for s in cpu], fontsize='small')
+
+
+def _draw_share(axis, heights, reached, starts, style):
+    bars = axis.barh(heights, (reached / starts).fillna(0), 0.38, edgecolor='0.15', **style)
+    axis.bar_label(bars, [f' {n:.0f} of {of:.0f}' if of == of else '' for n, of in zip(reached, starts)], fontsize='small')
+
+
+def _draw_cost(axis, heights, rows, style):
+    distances = rows['off replayed'].abs().clip(lower=SMALLEST)
+    axis.scatter(distances, heights[rows.problem], s=30, color=style['color'], edgecolor='0.15', linewidth=0.5)
 
 
 def write(folder):
     """Print and write the table and the picture of the rows in ``folder``."""
-    table = summary(pd.read_csv(folder / 'rows.csv'))
+    rows = pd.read_csv(folder / 'rows.csv')
+    table = summary(rows)
     table.to_csv(folder / 'summary.csv')
     print(table.to_string())
-    draw(table).savefig(folder / 'summary.png', dpi=150)
+    draw(rows, table).savefig(folder / 'summary.png', dpi=150)
