@@ -2,7 +2,7 @@
 
     y' = w,   w' = -g + normal,   y(0) = g theta^2 / 2,   w(0) = 0,   z' = c (w / g)^2,   min z(2) - a theta
 
-with c = c_1 until t = 1, c_2 from there on.  It lands at t = theta and rests, so that dz(2)/dtheta is c_1 below theta = 1, c_2 above.
+with c = c_1 until t = 1, c_2 from there on.  It lands at t = theta and rests: dz(2)/dtheta is c_1 below theta = 1, c_2 above.
 """
 
 from dataclasses import dataclass
