@@ -8,7 +8,8 @@ the solver; no time in it).
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
 ``evaluation``, ``gradient``, ``gradients``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``units_of_measure``,
-``expression_key``, ``stamp``, ``structural_key``, ``node_search``, ``own_data`` and ``phase`` are tools. This room imports from no other.
+``expression_key``, ``stamp``, ``structural_key``, ``node_search``, ``own_data`` and ``phase`` are tools. This room imports from no
+other.
 """
 
 from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
@@ -59,7 +60,7 @@ from pyomo_fesd.core.node_search import contains_node, leaves_of
 from pyomo_fesd.core.own_data import data_of, own_components, own_data, variables_below
 from pyomo_fesd.core.parts import Part
 from pyomo_fesd.core.phase import phase
-from pyomo_fesd.core.positive_part import add_positive_part, declare_positive_part
+from pyomo_fesd.core.positive_part import add_part_of_number, add_positive_part, declare_positive_part
 from pyomo_fesd.core.private_data import records_below, remember_records
 from pyomo_fesd.core.renamed import Renamed
 from pyomo_fesd.core.rollback import restored, restored_on_error

@@ -31,7 +31,12 @@ def declare_positive_part(block: BlockData, *index) -> None:
 
 def add_positive_part(block: BlockData, index: tuple, z) -> VarData:
     """Add max(0, z/[z]) at ``index`` (empty for a scalar) and return the variable s."""
+    return add_part_of_number(block, index, without_unit(z))
+
+
+def add_part_of_number(block: BlockData, index: tuple, z) -> VarData:
+    """Add max(0, z), where z has no unit, at ``index`` and return the variable s."""
     s = block.s[index or None]
     s.set_value(max(0.0, value_or_zero(z)), skip_validation=True)
-    block.complementarity.add(index or None, complements(s >= 0, s - without_unit(z) >= 0))
+    block.complementarity.add(index or None, complements(s >= 0, s - z >= 0))
     return s
