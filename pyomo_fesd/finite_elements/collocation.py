@@ -15,10 +15,12 @@ Does not apply: to models that were discretised before.
 """
 
 import numpy as np
-from pyomo.dae import ContinuousSet
+from pyomo.dae import ContinuousSet, DerivativeVar
 from pyomo.dae.misc import generate_finite_elements
 from pyomo.dae.plugins.colloc import Collocation_Discretization_Transformation
 from scipy.special import roots_jacobi, roots_legendre
+
+from pyomo_fesd.core import stored_index
 
 
 class Collocation(Collocation_Discretization_Transformation):
@@ -46,6 +48,7 @@ class Collocation(Collocation_Discretization_Transformation):
         elements, tau = list(wrt), self._tau[currentds]
         self._place_points(wrt, elements, tau)
         rates = self._adot[currentds], self._adotdot[currentds]
+        _read_states_directly(block, wrt)
         self._scheme = [_Scheme(wrt, elements, order, rate) for order, rate in enumerate(rates, start=1)]
         self._tau[currentds] = []
         super()._transformBlock(block, currentds)
@@ -79,6 +82,15 @@ class Collocation(Collocation_Discretization_Transformation):
         self._tau[wrt], self._afinal[wrt] = [float(t) for t in tau], None
         # row i: polynomial i
         self._adot[wrt], self._adotdot[wrt] = rates.T.tolist(), (rates @ rates).T.tolist()
+
+
+def _read_states_directly(block, wrt):
+    """Let derivatives read their states by the index that Pyomo stores: pyomo.dae gives a tuple, for which Pyomo searches."""
+    for derivative in block.component_objects(DerivativeVar, descend_into=True):
+        over = derivative.get_continuousset_list()
+        if len(over) == 1 and over[0] is wrt:
+            x = derivative.get_state_var()
+            derivative.set_derivative_expression(lambda *index, x=x: x[stored_index(index)])
 
 
 class _Scheme:

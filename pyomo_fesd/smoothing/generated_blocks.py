@@ -4,7 +4,7 @@ from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Set
 
-from pyomo_fesd.core import GENERATED, add_part_of_number, declare_positive_part, index_tuple
+from pyomo_fesd.core import GENERATED, add_part_of_number, declare_positive_part, index_tuple, stored_index
 
 NAME = GENERATED + 'kinks'
 
@@ -46,7 +46,7 @@ def last_number(source) -> int:
     block, index = _find(source), index_tuple(source.index())
     if block is None:
         return 0
-    return max((k for k in block.numbers if ((*index, k) if index else k) in block.complementarity), default=0)
+    return max((k for k in block.numbers if stored_index((*index, k)) in block.complementarity), default=0)
 
 
 def source_of(condition):
