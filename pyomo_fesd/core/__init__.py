@@ -8,7 +8,8 @@ the solver; no time in it).
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
 ``evaluation``, ``gradient``, ``gradients``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``units_of_measure``,
-``expression_key``, ``structural_key``, ``node_search``, ``own_data`` and ``phase`` are tools. This room imports from no other.
+``expression_key``, ``stamp``, ``structural_key``, ``node_search``, ``own_data`` and ``phase`` are tools. This room imports from no
+other.
 """
 
 from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
@@ -24,7 +25,7 @@ from pyomo_fesd.core.evaluation import (
     value_or_zero,
     variables_that_count,
 )
-from pyomo_fesd.core.expression_key import Swap, component_key, exchanged, expression_key, prefix_tokens
+from pyomo_fesd.core.expression_key import component_key, exchanged, expression_key, prefix_tokens
 from pyomo_fesd.core.generated import GENERATED, is_generated, public_name, source_name
 from pyomo_fesd.core.gradient import gradient
 from pyomo_fesd.core.gradients import gradients
@@ -56,14 +57,15 @@ from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, i
 from pyomo_fesd.core.keywords import check_keywords, read_keywords
 from pyomo_fesd.core.moving_grid import MovingGrid, Split, add_moving_grid, moving_grids
 from pyomo_fesd.core.node_search import contains_node, leaves_of
-from pyomo_fesd.core.own_data import data_of, own_components, own_data, variables_below
+from pyomo_fesd.core.own_data import components_reader, data_of, own_components, own_data, variables_below
 from pyomo_fesd.core.parts import Part
 from pyomo_fesd.core.phase import phase
-from pyomo_fesd.core.positive_part import add_positive_part, declare_positive_part
+from pyomo_fesd.core.positive_part import add_part_of_number, add_positive_part, declare_positive_part
 from pyomo_fesd.core.private_data import records_below, remember_records
 from pyomo_fesd.core.renamed import Renamed
 from pyomo_fesd.core.rollback import restored, restored_on_error
 from pyomo_fesd.core.smallest import add_smallest, declare_smallest
+from pyomo_fesd.core.stamp import Stamp
 from pyomo_fesd.core.step import add_step, declare_step
 from pyomo_fesd.core.structural_key import StructuralKey, any_number, exactly, nine_digits, variables_of
 from pyomo_fesd.core.switched_systems import (
@@ -97,6 +99,7 @@ from pyomo_fesd.core.time_index import (
     is_indexed_by,
     refuse_foreign,
     refuse_no_model,
+    stored_index,
     strip_time,
 )
 from pyomo_fesd.core.turns import REDIRECTION, TRANSFORMATION

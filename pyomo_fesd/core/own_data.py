@@ -5,7 +5,7 @@ Leaves: nothing.
 Does not apply: where the user has named components, which may be References.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from pyomo.core import Block, Var
 
@@ -23,6 +23,18 @@ def own_components(block: Block, ctype, descend_into, active: bool | None = None
         if not places.isdisjoint(place._ctypes):
             found = [b for c in inner.values() if not _is_reference(c) for b in c.values() if not met.isdisjoint(b._ctypes)]
             waiting += [b for b in reversed(found) if active is None or b.active == active]
+
+
+def components_reader(block: Block, ctypes: frozenset, active: bool | None = None) -> Callable:
+    """Return the function from ``block``, or one below it, to its components of some types, References among them."""
+    components = block.component_map(ctypes, active)
+
+    def read(place):
+        # Disjuncts are many: Pyomo takes longer to make a map than to read it
+        components._block = place
+        return () if ctypes.isdisjoint(place._ctypes) else components.values()
+
+    return read
 
 
 def _is_reference(component):

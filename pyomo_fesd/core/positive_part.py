@@ -18,6 +18,7 @@ from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core.evaluation import value_or_zero
 from pyomo_fesd.core.switched_systems import switched_systems
+from pyomo_fesd.core.time_index import stored_index
 from pyomo_fesd.core.units_of_measure import without_unit
 
 
@@ -31,7 +32,12 @@ def declare_positive_part(block: BlockData, *index) -> None:
 
 def add_positive_part(block: BlockData, index: tuple, z) -> VarData:
     """Add max(0, z/[z]) at ``index`` (empty for a scalar) and return the variable s."""
-    s = block.s[index or None]
+    return add_part_of_number(block, index, without_unit(z))
+
+
+def add_part_of_number(block: BlockData, index: tuple, z) -> VarData:
+    """Add max(0, z), where z has no unit, at ``index`` and return the variable s."""
+    s = block.s[stored_index(index)]
     s.set_value(max(0.0, value_or_zero(z)), skip_validation=True)
-    block.complementarity.add(index or None, complements(s >= 0, s - without_unit(z) >= 0))
+    block.complementarity.add(stored_index(index), complements(s >= 0, s - z >= 0))
     return s

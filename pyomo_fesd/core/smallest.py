@@ -17,6 +17,7 @@ from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core.evaluation import value_or_zero
 from pyomo_fesd.core.switched_systems import Dependents, switched_systems
+from pyomo_fesd.core.time_index import stored_index
 from pyomo_fesd.core.units_of_measure import without_unit
 
 #: Distances below this are 0.
@@ -38,18 +39,17 @@ def declare_smallest(block: BlockData, sets: tuple, number: int) -> None:
 
 def add_smallest(block: BlockData, index: tuple, g: list) -> list:
     """Add the linear program whose solution nu weights the smallest of the functions g_i at ``index``; return nu."""
-    # with one index set only, Pyomo wants the index itself
-    nu, lam = ([variable[(*index, i) if index else i] for i in block.regions] for variable in (block.nu, block.lam))
-    mu = block.mu[index or None]
+    nu, lam = ([variable[stored_index((*index, i))] for i in block.regions] for variable in (block.nu, block.lam))
+    mu = block.mu[stored_index(index)]
     mu.value, *found = smallest_values([value_or_zero(g_i) for g_i in g])
     for i, g_i in enumerate(g):
         nu[i].value, lam[i].value = 1 / len(g), found[i]
-        block.stationarity.add((*index, i + 1) if index else i + 1, without_unit(g_i) - lam[i] - mu == 0)
-        block.complementarity.add((*index, i + 1) if index else i + 1, complements(nu[i] >= 0, lam[i] >= 0))
+        block.stationarity.add(stored_index((*index, i + 1)), without_unit(g_i) - lam[i] - mu == 0)
+        block.complementarity.add(stored_index((*index, i + 1)), complements(nu[i] >= 0, lam[i] >= 0))
         if i:
             # all but one: the last follows from the simplex
             switched_systems(block).selectors.add(nu[i])
-    block.simplex.add(index or None, sum(nu) == 1)
+    block.simplex.add(stored_index(index), sum(nu) == 1)
     switched_systems(block).dependents.append(Dependents((mu, *lam, *nu), tuple(g), smallest_values))
     return nu
 

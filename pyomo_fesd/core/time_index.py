@@ -21,6 +21,11 @@ def index_tuple(index) -> tuple:
     return () if index is None else index if isinstance(index, tuple) else (index,)
 
 
+def stored_index(index: tuple):
+    """Return an index tuple as Pyomo stores it, None for a scalar: it finds a tuple of one only after a search of its own."""
+    return index if len(index) > 1 else index[0] if index else None
+
+
 def ancestry(data):
     """Yield ``data`` and the blocks around it, from the inside out, without the model."""
     while data is not None and data.parent_block() is not None:
@@ -136,7 +141,7 @@ class TimeIndex:
         position = self._place(component).position
         if position is not None and not _is_whole(data):
             index = _replaced(index_tuple(data.index()), position, label)
-            return component[index if len(index) > 1 else index[0]]
+            return component[stored_index(index)]
         block = data.parent_block()
         other = None if block is None or block.parent_block() is None else self.at(block, label)
         if other is None:

@@ -7,6 +7,7 @@ solutions.  Here the points come from scipy, and the coefficients from the baryc
     w_i = 1/prod_j (tau_i - tau_j),   L_i'(tau_j) = w_i/w_j / (tau_j - tau_i),   sum_i L_i'(tau_j) = 0.
 
 pyomo.dae rounds the labels of collocation points to 6 decimals, which is too coarse for short elements; here the number is given.
+It searches all points for the element of each equation; here each point knows its element.
 
 Takes: the arguments of pyomo.dae's ``dae.collocation``, and the number of decimals of the labels.
 Leaves: the same equations.
@@ -14,10 +15,12 @@ Does not apply: to models that were discretised before.
 """
 
 import numpy as np
-from pyomo.dae import ContinuousSet
+from pyomo.dae import ContinuousSet, DerivativeVar
 from pyomo.dae.misc import generate_finite_elements
 from pyomo.dae.plugins.colloc import Collocation_Discretization_Transformation
 from scipy.special import roots_jacobi, roots_legendre
+
+from pyomo_fesd.core import stored_index
 
 
 class Collocation(Collocation_Discretization_Transformation):
@@ -44,6 +47,9 @@ class Collocation(Collocation_Discretization_Transformation):
         generate_finite_elements(wrt, self._nfe[currentds])
         elements, tau = list(wrt), self._tau[currentds]
         self._place_points(wrt, elements, tau)
+        rates = self._adot[currentds], self._adotdot[currentds]
+        _read_states_directly(block, wrt)
+        self._scheme = [_Scheme(wrt, elements, order, rate) for order, rate in enumerate(rates, start=1)]
         self._tau[currentds] = []
         super()._transformBlock(block, currentds)
         wrt.get_discretization_info().update(nfe=len(elements) - 1, tau_points=tau)
@@ -76,6 +82,48 @@ class Collocation(Collocation_Discretization_Transformation):
         self._tau[wrt], self._afinal[wrt] = [float(t) for t in tau], None
         # row i: polynomial i
         self._adot[wrt], self._adotdot[wrt] = rates.T.tolist(), (rates @ rates).T.tolist()
+
+
+def _read_states_directly(block, wrt):
+    """Let derivatives read their states by the index that Pyomo stores: pyomo.dae gives a tuple, for which Pyomo searches."""
+    for derivative in block.component_objects(DerivativeVar, descend_into=True):
+        over = derivative.get_continuousset_list()
+        if len(over) == 1 and over[0] is wrt:
+            x = derivative.get_state_var()
+            derivative.set_derivative_expression(lambda *index, x=x: x[stored_index(index)])
+
+
+class _Scheme:
+    """The derivative of some order at a collocation point, as pyomo.dae calls a scheme: ``scheme(f, wrt)(label)``.
+
+    Parameters
+    ----------
+    wrt : ContinuousSet
+        with its collocation points
+    elements : list of float
+        the boundaries
+    order : int
+    rates : list of lists
+        the derivative of polynomial j at point k, for elements of length 1
+    """
+
+    def __init__(self, wrt: ContinuousSet, elements: list[float], order: int, rates: list):
+        labels, first, self._terms = list(wrt), 0, {}
+        for left, right in zip(elements, elements[1:]):
+            points = labels[first : first + len(rates)]
+            factor = (1.0 / (right - left)) ** order
+            for k, label in enumerate(points[1:], start=1):
+                self._terms[label] = [(t, rates[j][k] * factor) for j, t in enumerate(points)]
+            first = labels.index(right, first + len(rates) - 1)
+
+    def __call__(self, f, wrt):
+        return lambda label: self._at(f, label)
+
+    def _at(self, f, label):
+        """The sum; pyomo.dae takes an IndexError for a label without an equation."""
+        if label not in self._terms:
+            raise IndexError(label)
+        return sum(f(t) * weight for t, weight in self._terms[label])
 
 
 def _differences(tau):

@@ -25,6 +25,7 @@ from pyomo_fesd.core import (
     TimeIndex,
     index_tuple,
     read_complementarity,
+    stored_index,
     switched_systems,
     value_or_zero,
 )
@@ -112,10 +113,10 @@ def _declare_split(block, index):
 
 def _add_parts_of_function(block, index, condition, smooth):
     """p and n at one time, recorded as continuous, or as free to jump."""
-    p, n = block.p[index or None], block.n[index or None]
+    p, n = block.p[stored_index(index)], block.n[stored_index(index)]
     now, systems = value_or_zero(condition.F), switched_systems(block)
     p.value, n.value = max(now, 0.0), max(-now, 0.0)
-    block.split.add(index or None, condition.F == p - n)
+    block.split.add(stored_index(index), condition.F == p - n)
     if smooth:
         systems.continuous.update((part, block.split) for part in (p, n))
     else:
@@ -133,7 +134,7 @@ def _impose_given_side(block, index, condition, source):
     """x is given: F >= 0 at the lower bound, F <= 0 at the upper, F = 0 between; no condition on F where the bounds are equal."""
     low, x, high, F = condition
     if not _is_given(x):
-        block.imposed.add(index or None, x == low)
+        block.imposed.add(stored_index(index), x == low)
         return
     above, below = value(condition.above), value(condition.below)
     if min(above, below) < -OUTSIDE:
@@ -143,9 +144,9 @@ def _impose_given_side(block, index, condition, source):
             "fix it between them, or unfix it",
         )
     if min(above, below) > OUTSIDE:
-        block.imposed.add(index or None, F == 0)
+        block.imposed.add(stored_index(index), F == 0)
     elif max(above, below) > OUTSIDE:
-        block.imposed.add(index or None, F >= 0 if above <= OUTSIDE else F <= 0)
+        block.imposed.add(stored_index(index), F >= 0 if above <= OUTSIDE else F <= 0)
 
 
 def repeats_other_side(moving: MovingGrid, condition, side) -> bool:

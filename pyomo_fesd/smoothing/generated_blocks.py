@@ -4,7 +4,7 @@ from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Set
 
-from pyomo_fesd.core import GENERATED, add_positive_part, declare_positive_part, in_unit_of, index_tuple
+from pyomo_fesd.core import GENERATED, add_part_of_number, declare_positive_part, index_tuple, stored_index
 
 NAME = GENERATED + 'kinks'
 
@@ -32,12 +32,13 @@ def _pair_sources(block):
 
 
 def add_to_source(source, number: int, z):
-    """Add s = max(0, z/[z]) as positive part ``number`` of a source (a ConstraintData, ...) and return s [z], in the unit of z."""
+    """Add s = max(0, z), where z has no unit, as positive part ``number`` of a source (a ConstraintData, ...) and return s."""
     block = _find(source) or _declare_positive_parts(source)
-    block.numbers.add(number)
-    s = add_positive_part(block, (*index_tuple(source.index()), number), z)
+    if number not in block.numbers:
+        block.numbers.add(number)
+    s = add_part_of_number(block, (*index_tuple(source.index()), number), z)
     _pair_sources(block)[block.complementarity[s.index()]] = source
-    return in_unit_of(s, z)
+    return s
 
 
 def last_number(source) -> int:
@@ -45,7 +46,7 @@ def last_number(source) -> int:
     block, index = _find(source), index_tuple(source.index())
     if block is None:
         return 0
-    return max((k for k in block.numbers if ((*index, k) if index else k) in block.complementarity), default=0)
+    return max((k for k in block.numbers if stored_index((*index, k)) in block.complementarity), default=0)
 
 
 def source_of(condition):

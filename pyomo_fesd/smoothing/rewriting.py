@@ -20,6 +20,11 @@ PATTERN_NODES = frozenset(RULES)
 CLOSED = {*native_types, ne.Expr_ifExpression}
 
 
+def may_match(expressions) -> bool:
+    """Whether any of some expressions or relations contains a node that may be a pattern, or a named Expression."""
+    return any(contains_node(e, PATTERN_NODES) for e in expressions)
+
+
 def _expression(result):
     return result.expression() if isinstance(result, LinearCombination) else result
 
@@ -94,7 +99,7 @@ class PatternReader(_Walker):
         """
         self._begin(replaced)
         self._matches, self._named = [], []
-        if contains_node(expr, PATTERN_NODES):
+        if may_match((expr,)):
             self.walk_expression(expr)
         return self._matches, self._named
 

@@ -8,7 +8,7 @@ from pyomo.core.expr import EqualityExpression, InequalityExpression, RangedExpr
 from pyomo.gdp import Disjunct
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import FesdError, ancestry
+from pyomo_fesd.core import FesdError, ancestry, own_data
 
 ACTIVE = (Constraint, Objective, Complementarity)
 TYPES = (*ACTIVE, Expression)
@@ -28,7 +28,7 @@ def sources(instance, targets):
             raise FesdError(target, "this target belongs to another model", "give a component of the model itself")
         if target.ctype is Block:
             for block in _datas(target):
-                yield from block.component_data_objects(ACTIVE, active=True, descend_into=(Block, Disjunct))
+                yield from (d for d in own_data(block, ACTIVE, (Block, Disjunct), active=True) if d.active)
         elif target.ctype in TYPES:
             yield from (d for d in _datas(target) if target.ctype is Expression or d.active)
         else:
@@ -45,21 +45,21 @@ def _datas(component):
 
 def expressions(source) -> list:
     """Return the expressions of a source: the sides of its relations, or its one expression."""
-    return [side for whole in _wholes(source) for side in _relation_sides(whole)]
+    return [side for whole in wholes(source) for side in _relation_sides(whole)]
 
 
 def set_expressions(source, new) -> None:
     """Set the expressions of a source, in the order of ``expressions``."""
     new = iter(new)
-    wholes = []
-    for whole in _wholes(source):
+    stated = []
+    for whole in wholes(source):
         sides = [next(new) for _ in _relation_sides(whole)]
-        wholes.append(whole.create_node_with_local_data(sides) if isinstance(whole, RELATIONS) else sides[0])
-    source.set_value(tuple(wholes) if source.ctype is Complementarity else wholes[0])
+        stated.append(whole.create_node_with_local_data(sides) if isinstance(whole, RELATIONS) else sides[0])
+    source.set_value(tuple(stated) if source.ctype is Complementarity else stated[0])
 
 
-def _wholes(source):
-    """The two arguments of a condition, the one expression of other sources."""
+def wholes(source):
+    """Return the two arguments of a condition, the one expression of other sources."""
     return getattr(source, '_args', None) or () if source.ctype is Complementarity else (source.expr,)
 
 

@@ -8,8 +8,8 @@ from pyomo.dae import Integral
 from pyomo.gdp import Disjunct
 
 from pyomo_fesd.core import ancestry
-from pyomo_fesd.smoothing.rewriting import PatternReader
-from pyomo_fesd.smoothing.sources import expressions
+from pyomo_fesd.smoothing.rewriting import PatternReader, may_match
+from pyomo_fesd.smoothing.sources import expressions, wholes
 
 
 class Survey:
@@ -37,11 +37,14 @@ class Survey:
         self._guarded = _closure(self._read_all(sources))
 
     def _read_all(self, sources):
-        """Read ``matches`` and return the uses of named Expressions by source."""
-        uses, waiting = ComponentMap(), list(sources)[::-1]
+        """Read ``matches`` and return the uses of named Expressions by source; sources with neither have no entry."""
+        uses, waiting, met = ComponentMap(), list(sources)[::-1], set()
         while waiting:
             source = waiting.pop()
-            if source not in self.matches:
+            if id(source) in met:
+                continue
+            met.add(id(source))
+            if may_match(wholes(source)):
                 self.matches[source], uses[source] = self._read(source)
                 waiting.extend(e for e, _ in reversed(uses[source]))
         return uses
@@ -49,7 +52,7 @@ class Survey:
     def _read(self, source):
         """The matches and the uses of named Expressions in one source; no uses where the source stays as it is."""
         readings = [self._reader.read(e, self.replaced_in(source)) for e in expressions(source)]
-        matches, uses = (list(chain.from_iterable(found)) for found in zip(*readings)) if readings else ([], [])
+        matches, uses = (list(chain.from_iterable(found)) for found in zip(*readings))
         return matches, [] if uses and (self._excluded(source) or _in_disjunct(source)) else uses
 
     def replaced_in(self, source):
@@ -93,5 +96,5 @@ def _closure(uses):
         expression = waiting.pop()
         if expression not in guarded:
             guarded.add(expression)
-            waiting.extend(e for e, _ in uses[expression])
+            waiting.extend(e for e, _ in uses.get(expression, ()))
     return guarded

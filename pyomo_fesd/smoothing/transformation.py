@@ -1,7 +1,6 @@
 """``fesd.smooth_to_complementarity``: write |z| and its smoothings exactly (theory, eq. 8)."""
 
 import logging
-from functools import partial
 
 from pyomo.common.config import Bool, ConfigDict, ConfigValue, NonNegativeFloat, document_class_CONFIG
 from pyomo.common.gc_manager import PauseGC
@@ -17,15 +16,13 @@ from pyomo_fesd.core import (
     add_writer,
     continuous_sets,
     find_continuous_set,
-    known_sign,
     moving_grids,
     read_keywords,
     restored_on_error,
 )
-from pyomo_fesd.smoothing.generated_blocks import add_to_source, last_number, source_of
-from pyomo_fesd.smoothing.linear_terms import LinearCombination
-from pyomo_fesd.smoothing.rewriting import PatternReplacer
-from pyomo_fesd.smoothing.sources import expressions, set_expressions, sources
+from pyomo_fesd.smoothing.generated_blocks import source_of
+from pyomo_fesd.smoothing.rewritten_sources import SourceRewriter
+from pyomo_fesd.smoothing.sources import sources
 from pyomo_fesd.smoothing.summary import Summary
 from pyomo_fesd.smoothing.survey import Survey
 
@@ -134,9 +131,13 @@ def _replace_absolute_values(instance, targets, choice):
         survey = Survey(sources(instance, targets), **choice)
         reasons = [(s, [survey.reason(s, *m) for m in matches]) for s, matches in survey.matches.items()]
         _refuse_moving_elements(s for s, found in reasons if None in found)
-        summary, replacer = Summary(), PatternReplacer()
+        summary, rewriter = Summary(), SourceRewriter()
         for source, found in reasons:
-            _rewrite(source, found, partial(replacer.replace, replaced=survey.replaced_in(source)), summary)
+            for reason in filter(None, found):
+                summary.note_left(source, reason)
+            if None in found:
+                pairs = rewriter.rewrite(source, found, survey.replaced_in(source))
+                summary.note_changed(source, found.count(None), pairs)
     return summary
 
 
@@ -154,37 +155,3 @@ def _refuse_moving_elements(changing):
                     f"it contains an absolute value, but the elements over '{wrt.name}' are movable already",
                     f"apply {NAME} before fesd.finite_elements",
                 )
-
-
-def _rewrite(source, reasons, replace, summary):
-    """Rewrite one source, if anything in it is to be replaced."""
-    for reason in filter(None, reasons):
-        summary.note_left(source, reason)
-    if None in reasons:
-        parts = _PositiveParts(source)
-        set_expressions(source, [replace(e, absolute=parts.absolute) for e in expressions(source)])
-        summary.note_changed(source, reasons.count(None), parts.pairs)
-
-
-class _PositiveParts:
-    """The positive parts of one source: equal z, or z and -z, share one s = max(0, z)."""
-
-    def __init__(self, source):
-        self._source = source
-        self._number = last_number(source)
-        self._known = {}
-        self.pairs = 0
-
-    def absolute(self, z):
-        """|z| = 2 s - z; z and the result are LinearCombinations."""
-        for sign in (1, -1):
-            if z.key(sign) in self._known:
-                return LinearCombination(self._known[z.key(sign)], 2).add(z, -sign)
-        self._number += 1  # counted also where bounds decide, so that each has the same number at all times
-        expr = z.expression()
-        sign = known_sign(expr)
-        if sign:
-            return LinearCombination(z, sign)
-        s = self._known[z.key()] = add_to_source(self._source, self._number, expr)
-        self.pairs += 1
-        return LinearCombination(s, 2).add(z, -1)

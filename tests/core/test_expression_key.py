@@ -11,7 +11,8 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunction
 
 from pyomo_fesd.core.errors import FesdError
-from pyomo_fesd.core.expression_key import Swap, component_key, exchanged, expression_key
+from pyomo_fesd.core.expression_key import component_key, exchanged, expression_key
+from pyomo_fesd.core.stamp import Stamp
 
 
 @pytest.fixture
@@ -39,7 +40,7 @@ def of(*expressions, kind=lambda v: None):
 def test_other_variables_have_the_same_key_and_can_be_put_in(m, rule):
     (key, parts), (other, others) = (expression_key([rule(m, *ij)], lambda v: None) for ij in ((0, 1), (2, 3)))
     assert key == other
-    assert compare_expressions(Swap(parts, others).expression(rule(m, 0, 1)), rule(m, 2, 3))
+    assert compare_expressions(Stamp(parts).expression(rule(m, 0, 1), others), rule(m, 2, 3))
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from math import prod
 from pyomo.core import RangeSet
 from pyomo.core.base.block import BlockData
 
-from pyomo_fesd.core import add_step, declare_step
+from pyomo_fesd.core import add_step, declare_step, stored_index
 from pyomo_fesd.dcs.reading import ModeSystem, not_covered_once
 
 NAME = 'heaviside'
@@ -69,7 +69,7 @@ def add(block: BlockData, index: tuple, system: ModeSystem) -> None:
 def weight(block: BlockData, index: tuple, system: ModeSystem, modes):
     """Return the sum of nu_i over some of the ``modes``, by number."""
     implicants = system.regions.geometry.implicants
-    alpha = [block.alpha[key or None] for key in _indices(block, index)]
+    alpha = [block.alpha[stored_index(key)] for key in _indices(block, index)]
     own = implicants.covering(frozenset(modes))
     others = implicants.covering(frozenset(range(len(system.modes))) - frozenset(modes))
     if len(others) == 1 and sum(map(abs, others[0])) == 1:
@@ -89,7 +89,7 @@ def owners(block: BlockData, index: tuple, system: ModeSystem) -> Iterable:
 
 def equations(block: BlockData, index: tuple) -> list:
     """Return the equations of one time."""
-    return [block.switching[key or None] for key in _indices(block, index)]
+    return [block.switching[stored_index(key)] for key in _indices(block, index)]
 
 
 def shortfall(block: BlockData, index: tuple, system: ModeSystem, mode: int, k: int):
@@ -97,5 +97,5 @@ def shortfall(block: BlockData, index: tuple, system: ModeSystem, mode: int, k: 
     used = list(system.regions.geometry.implicants.used)
     if k not in used:
         return None
-    key = _indices(block, index)[used.index(k)] or None
+    key = stored_index(_indices(block, index)[used.index(k)])
     return block.n[key] if system.regions.geometry.signs[mode][k] > 0 else block.p[key]

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from pyomo.core.base.block import BlockData
 
-from pyomo_fesd.core import add_smallest, declare_smallest, without_unit
+from pyomo_fesd.core import add_smallest, declare_smallest, stored_index, without_unit
 from pyomo_fesd.dcs.reading import ModeSystem
 
 NAME = 'stewart'
@@ -66,7 +66,7 @@ def owners(block: BlockData, index: tuple, system: ModeSystem) -> Iterable:
 
 def equations(block: BlockData, index: tuple) -> list:
     """Return the equations of one time."""
-    return [block.simplex[index or None], *(block.stationarity[(*index, i)] for i in block.regions)]
+    return [block.simplex[stored_index(index)], *(block.stationarity[(*index, i)] for i in block.regions)]
 
 
 def shortfall(block: BlockData, index: tuple, system: ModeSystem, mode: int, k: int):

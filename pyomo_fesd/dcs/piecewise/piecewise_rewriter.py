@@ -22,7 +22,15 @@ from pyomo.dae import Integral
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import GENERATED, FesdError, contains_node, discretised, is_discretisation_equation, is_generated
+from pyomo_fesd.core import (
+    GENERATED,
+    FesdError,
+    components_reader,
+    contains_node,
+    discretised,
+    is_discretisation_equation,
+    is_generated,
+)
 from pyomo_fesd.dcs.piecewise import expr_if, multivariate, univariate
 from pyomo_fesd.dcs.piecewise.replaced_constraints import deactivate, replace_constraint
 from pyomo_fesd.dcs.piecewise.rewrite_context import RewriteContext, SharedContext
@@ -49,6 +57,14 @@ class PiecewiseRewriter:
         self._shared = SharedContext(instance, times, undo)
         self._times, self._undo = times, undo
 
+    def _contains(self, source):
+        """Whether a component contains a piecewise function."""
+        sides = _complementarity_sides(source) if source.ctype is Complementarity else (source.expr,)
+        return any(contains_node(side, NODES, self._enters) for side in sides)
+
+    def _enters(self, named):
+        return not self.waits(named)
+
     def replace_all(self, blocks) -> None:
         """Replace everything below ``blocks``."""
         for block in blocks:
@@ -57,9 +73,8 @@ class PiecewiseRewriter:
             for source in found.piecewise:
                 relation = univariate.relation(source, RewriteContext(self._shared, source, self._times.time(source)))
                 replace_constraint(source, relation, self._undo)
-            for source in found.sources:
-                if _contains(source, self._times.wrt):
-                    WRITERS[source.ctype](self, source)
+            for source in filter(self._contains, found.sources):
+                WRITERS[source.ctype](self, source)
             self._deactivate_functions(found.functions)
         self._shared.breakpoints.warn_explicit_time()
 
@@ -150,12 +165,13 @@ class _Survey:
 
     def __init__(self, block, times):
         self.piecewise, self.functions, sources = [], [], {}
+        sought_in = components_reader(block, SOUGHT, active=True)
         for place in block.block_data_objects(active=True, descend_into=EVERYWHERE):
             if univariate.is_piecewise(place) and times.time(place) is not None:
                 self.piecewise.append(place)
                 continue
             generated = is_generated(place)
-            for component in place.component_map(SOUGHT, active=True).values():
+            for component in sought_in(place):
                 if component.ctype is PiecewiseLinearFunction:
                     self.functions += _active(component)
                 elif not generated and not _is_ours(component):
@@ -174,12 +190,6 @@ def _active(component):
 def _is_ours(component):
     """Whether pyomo.dae or this package has written a component beside those of the user."""
     return component.local_name.startswith(GENERATED) or is_discretisation_equation(component)
-
-
-def _contains(source, wrt):
-    """Whether a component contains a piecewise function."""
-    sides = _complementarity_sides(source) if source.ctype is Complementarity else (source.expr,)
-    return any(contains_node(side, NODES, enter=lambda named: not _waits(named, wrt)) for side in sides)
 
 
 def _complementarity_sides(condition):

@@ -3,7 +3,7 @@
 from itertools import chain
 
 from pyomo.common.collections import ComponentMap, ComponentSet
-from pyomo.core import Block, LogicalConstraint
+from pyomo.core import Block, BooleanVar, Constraint, LogicalConstraint, Var
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import DerivativeVar
 from pyomo.gdp import Disjunct
@@ -11,6 +11,8 @@ from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core import FesdError, variables_that_count
 
+#: Types of the components of most disjuncts; one Var is the binary of the indicator.
+PLAIN = {BooleanVar, Var, Constraint}
 #: Components that a disjunct over time cannot contain (a Disjunct only if it belongs to another tree): cause and fix.
 REFUSED_INSIDE = {
     Disjunct: (
@@ -26,16 +28,20 @@ def refuse_contents(tree, modes) -> None:
     """Refuse modes with disjuncts that contain components for which there is no rule."""
     disjuncts = {id(d): d for mode in modes for d in mode.disjuncts}
     for disjunct in disjuncts.values():
-        for component in _components(disjunct):
+        for component in _other_components(disjunct):
             if isinstance(component, DerivativeVar):
                 raise FesdError(component, "a DerivativeVar inside a disjunct", "declare it on the block that holds its state")
             if component.ctype in REFUSED_INSIDE and component.active:
                 _refuse_active(disjunct, component, tree)
 
 
-def _components(disjunct):
-    """The components of a disjunct and of the Blocks in it."""
-    return disjunct.component_objects(descend_into=Block) if Block in disjunct._ctypes else disjunct.component_map().values()
+def _other_components(disjunct):
+    """The components of a disjunct and of the Blocks in it; none where it holds its indicators and Constraints only, as most do."""
+    ctypes = disjunct._ctypes
+    if Block in ctypes:
+        return disjunct.component_objects(descend_into=Block)
+    plain = ctypes.keys() <= PLAIN and len(disjunct.component_map(Var)) == 1
+    return () if plain else disjunct.component_map().values()
 
 
 def _refuse_active(disjunct, component, tree):

@@ -10,7 +10,7 @@ from itertools import chain
 
 from pyomo.core.expr.compare import compare_expressions
 
-from pyomo_fesd.core import Swap
+from pyomo_fesd.core import Stamp
 from pyomo_fesd.dcs.reading.defined_variables import find_defined_variables
 from pyomo_fesd.dcs.reading.linear_equations import read_equation, solve
 
@@ -44,14 +44,14 @@ class ModeEquations:
         """Return those of modes that state regions alone, as they may at the first time: which mode begins."""
         return cls([], [[] for _ in equations], equations, [[] for _ in equations], [])
 
-    def swapped(self, swap: Swap, equations: list) -> 'ModeEquations':
-        """Return the same for other variables, by a ``Swap``, and the ``equations`` that contain these."""
-        others = Swap(chain(*self.equations), chain(*equations))
+    def stamped(self, stamp: Stamp, parts: list, equations: list) -> 'ModeEquations':
+        """Return the same for other ``parts``, and the ``equations`` that contain these."""
+        others = {id(con): other for con, other in zip(chain(*self.equations), chain(*equations))}
         return ModeEquations(
-            [swap[v] for v in self.defined],
-            [[f if f is None else swap.expression(f) for f in row] for row in self.rhs],
+            [parts[stamp.place(v)] for v in self.defined],
+            [[f if f is None else stamp.expression(f, parts) for f in row] for row in self.rhs],
             equations,
-            [[[others[con] for con in cons] for cons in row] for row in self.used],
+            [[[others[id(con)] for con in cons] for cons in row] for row in self.used],
             self.alike,
         )
 

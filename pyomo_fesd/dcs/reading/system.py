@@ -6,7 +6,7 @@ from itertools import chain
 from pyomo.common.collections import ComponentSet
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import Swap, expression_key, refuse_foreign
+from pyomo_fesd.core import Stamp, expression_key, refuse_foreign
 from pyomo_fesd.dcs.reading.disjunction_tree import DisjunctionTree
 from pyomo_fesd.dcs.reading.mode_contents import refuse_contents, refuse_defined_in_regions, refuse_derivatives_in_regions
 from pyomo_fesd.dcs.reading.mode_domains import read_laws
@@ -84,14 +84,13 @@ class SystemReader:
         )
         self._refuse_foreign(tree, modes, [*equalities, *inequalities], parts)
         if (counts, key) in self._read:
-            first, others = self._read[counts, key]
-            swap = Swap(others, parts)
-            regions = Regions([swap.expression(c) for c in first.regions.functions], first.regions.geometry)
-            return ModeSystem(tree, modes, regions, first.equations.swapped(swap, equalities), first.laws)
+            first, stamp = self._read[counts, key]
+            regions = Regions([stamp.expression(c, parts) for c in first.regions.functions], first.regions.geometry)
+            return ModeSystem(tree, modes, regions, first.equations.stamped(stamp, parts, equalities), first.laws)
         system = self._study(tree, modes, equalities, inequalities)
         # regions alone are right at the first time only
         if key is not None and any(equalities):
-            self._read[counts, key] = system, parts
+            self._read[counts, key] = system, Stamp(parts)
         return system
 
     def read_hysteresis(self, tree, modes) -> HysteresisSystem:

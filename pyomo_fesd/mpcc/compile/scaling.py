@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from pyomo.core.base.suffix import SuffixFinder
 
+SUFFIX = 'scaling_factor'
 #: Gradients of a side within these bounds are left as they are.
 MILD = (1e-2, 1e2)
 
@@ -32,13 +33,23 @@ class UserFactors:
     """Pyomo's ``scaling_factor`` suffixes, also on blocks above the one that is solved; 1 without one or if not ``enabled``."""
 
     def __init__(self, enabled):
-        self._find = SuffixFinder('scaling_factor', 1.0).find if enabled else None
+        self._find = SuffixFinder(SUFFIX, 1.0).find if enabled else None
+        self._scaled = {None: False}
 
     def of(self, components):
         """Factors of ``components``, as an array."""
         if self._find is None:
             return np.ones(len(components))
-        return np.array([1.0 if c is None else abs(float(self._find(c))) or 1.0 for c in components])
+        return np.array([1.0 if c is None else self._factor(c) for c in components])
+
+    def _factor(self, component):
+        return abs(float(self._find(component))) or 1.0 if self._is_scaled(component.parent_block()) else 1.0
+
+    def _is_scaled(self, block):
+        """Whether a block, or one above it, has such a suffix: Pyomo looks for the component in each, which takes longer."""
+        if block not in self._scaled:
+            self._scaled[block] = block.component(SUFFIX) is not None or self._is_scaled(block.parent_block())
+        return self._scaled[block]
 
 
 def side_factors(largest, given):
