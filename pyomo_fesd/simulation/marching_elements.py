@@ -48,12 +48,15 @@ class _Interval:
     Attributes
     ----------
     places : list of Element
+    compared : list of Element
+        places whose equations have to be alike; the first of an interval may have others, if several follow
     begin, end : float
     h : float
         length of its elements
     """
 
     places: list[Element]
+    compared: list[Element]
     begin: float
     end: float
     h: float
@@ -75,7 +78,7 @@ class MarchingElements:
         self._progress = Progress(times.wrt, self._moving.grid.stages, deadline)
         self._solver = ElementSolver(model, times, inputs, options, timer, self._progress)
         for interval in self._intervals:
-            if not self._solver.are_alike(interval.places[1:]) or _expressions_differ(model, times, interval.places):
+            if not self._solver.are_alike(interval.compared) or _expressions_differ(model, times, interval.places):
                 raise ElementsDiffer
         self._over_time = list(times.families_in(own_components(model.model(), Var, (Block, Disjunct))).values())
         self._table, self._switches = ElementTable(model, times), ElementSwitches(model, times)
@@ -192,9 +195,13 @@ class MarchingElements:
 def _intervals(grid, numbers) -> Iterator[_Interval]:
     """The places of each interval are one stretch between boundaries that keep their time, and its last element the next one."""
     stretches = list(grid.stages.values())
+    if len(stretches) == 1:
+        (places,) = stretches
+        stretches = [places, places[-1:]]
     for places, (rest,), number in zip(stretches[0::2], stretches[1::2], numbers, strict=True):
         begin, end = places[0].left, rest.right
-        yield _Interval(places, float(begin), float(end), (end - begin) / number)
+        compared = places if rest in places else places[1:]
+        yield _Interval(places, compared, float(begin), float(end), (end - begin) / number)
 
 
 def _expressions_differ(model, times, places):

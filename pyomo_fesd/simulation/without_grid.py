@@ -91,9 +91,14 @@ class WithoutGrid:
 
     def _marched(self, known, march):
         """The trajectory of elements that march; None if they differ."""
+        found = self._marched_on(known, march, self._lay_two) if self._may_march_on_two() else None
+        return self._marched_on(known, march, self._lay_few) if found is None else found
+
+    def _marched_on(self, known, march, lay):
+        """The trajectory of elements that march on the places that ``lay`` makes; None if they differ."""
         with restored(self._model, self._wrt):
             with withheld_messages(logger.name) as messages:
-                self._lay_few()
+                lay()
             try:
                 run = march(self._numbers)
             except ElementsDiffer:
@@ -113,6 +118,14 @@ class WithoutGrid:
         integrals = root.component_objects(Integral, descend_into=(Block, Disjunct))
         systems = all_switched_systems(root)
         return worth and not (systems.resets or systems.contacts) and next(integrals, None) is None
+
+    def _may_march_on_two(self):
+        """Whether two places may do: in one interval, and without hysteresis, whose modes end at a boundary before the last."""
+        return len(self._numbers) == 1 and not all_switched_systems(self._model.model()).hysteresis
+
+    def _lay_two(self):
+        """Lay two elements, with the ends of the only interval."""
+        self._lay(nfe=2, equilibration='none')
 
     def _lay_few(self):
         """Lay ``PLACES`` elements in each interval, and one for the rest of it."""
