@@ -14,6 +14,7 @@ from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core.grid import Element, Grid
+from pyomo_fesd.core.own_data import declared
 
 _SCOPE = 'pyomo_fesd.core.moving_grid'
 
@@ -200,7 +201,7 @@ def add_moving_grid(moving: MovingGrid) -> None:
 
 def _embedded_models(model: Block) -> Iterator[Model]:
     """Yield the models that are blocks of ``model``, as in the extensive form of a stochastic program, and those in them."""
-    for block in model.component_objects(Block, descend_into=False):
+    for block in declared(model, {Block}):
         if isinstance(block, Model):
             yield block
             yield from _embedded_models(block)

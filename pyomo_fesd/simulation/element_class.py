@@ -77,7 +77,7 @@ class ElementClass:
     @cached_property
     def _residuals(self):
         with phase(self._timer, 'compile'):
-            return ElementResiduals(self._pattern, self._tau, self._timer, self._options.get('user_scaling', True))
+            return ElementResiduals(self._pattern, self._tau, self._options.get('user_scaling', True))
 
     @cached_property
     def _stepper(self):

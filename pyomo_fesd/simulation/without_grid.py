@@ -30,6 +30,7 @@ from pyomo_fesd.core import (
     with_points,
     withheld_messages,
 )
+from pyomo_fesd.dcs import continues_everywhere
 from pyomo_fesd.finite_elements import FiniteElements
 from pyomo_fesd.results import SWITCHES, switches
 from pyomo_fesd.simulation.inputs import hold_first_values
@@ -141,7 +142,8 @@ class WithoutGrid:
 
     def _lay(self, **changes):
         with phase(self._timer, 'transform'):
-            TransformationFactory('fesd.dcs').apply_to(self._model, wrt=self._wrt)
+            if not continues_everywhere(self._model, self._wrt):
+                TransformationFactory('fesd.dcs').apply_to(self._model, wrt=self._wrt)
             given = {name: self._config[name] for name in OPTIONS} | {'piecewise_constant': self._held} | changes
             TransformationFactory('fesd.finite_elements').apply_to(self._model, wrt=self._wrt, **given)
 

@@ -26,11 +26,10 @@ from pyomo_fesd.mpcc.compile.mpcc_functions import MpccFunctions
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.parameters import parameter_values
 from pyomo_fesd.mpcc.compile.part_indices import part_indices
-from pyomo_fesd.mpcc.compile.round_off import EXACT
 from pyomo_fesd.mpcc.compile.scaled_functions import LARGE, ScaledFunctions, ScaledRows
 from pyomo_fesd.mpcc.compile.scaling import Scale, side_factors
-from pyomo_fesd.mpcc.compile.sizes import beside, row_factors, variable_factors, without_small
-from pyomo_fesd.mpcc.compile.sparse_entries import largest_entries, with_entries
+from pyomo_fesd.mpcc.compile.sizes import beside, certain_constants, row_factors, variable_factors, without_small
+from pyomo_fesd.mpcc.compile.sparse_entries import largest_entries, major_index, with_entries
 
 UNBOUNDED = (-np.inf, np.inf)
 #: Variables of a nonlinear model that may be scaled by coefficients.
@@ -104,10 +103,12 @@ class _Assembly:
         columns = {id(v): j for j, v in enumerate(self._variables)}
         alike = [[columns[id(v)] for v in group if id(v) in columns] for group in self._problem.hints.alike]
         alike = [group for group in alike if group]
-        s_x = variable_factors(J, (certain, constants), self._start, stated_bounds(self._variables), user.x, alike)
+        slopes = major_index(J), J.indices, J.data
+        s_x = variable_factors(slopes, (certain, constants), self._start, stated_bounds(self._variables), user.x, alike)
         points = (self._start, beside(self._start))
-        jacobians = [self._jacobian(self._rows.rows, w) @ sparse.diags(1 / s_x) for w in points]
-        return replace(user, x=s_x, g=row_factors(jacobians, user.g))
+        jacobians = (self._jacobian(self._rows.rows, w) for w in points)
+        largest = [largest_entries(with_entries(J, J.data / s_x[J.indices])) for J in jacobians]
+        return replace(user, x=s_x, g=row_factors(largest, user.g))
 
     def _linearised(self, w):
         """Jacobian of rows and sides, and the sizes of their distances from bounds where the variables are 0.
@@ -121,8 +122,8 @@ class _Assembly:
         values, terms = (np.concatenate(some)[:count] for some in zip(*parts))
         found, bounds = values - J @ w, np.concatenate([self._rows.lbg, np.zeros(sides)])
         constants = np.abs(found - np.where(np.isfinite(bounds), bounds, 0.0))
-        exact = constants > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
-        return J, np.maximum(np.where(exact, constants, 0.0), np.maximum(self._rows.cancelling, terms))
+        certain = certain_constants(constants, found, abs(J) @ np.abs(w))
+        return J, np.maximum(certain, np.maximum(self._rows.cancelling, terms))
 
     def _jacobian(self, functions, w):
         """Jacobian (csr) of ``functions`` at ``w``, found once: nobody may change it."""
