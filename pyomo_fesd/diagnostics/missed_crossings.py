@@ -17,11 +17,10 @@ from functools import cache, cached_property, partial
 import numpy as np
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, value
-from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import ContinuousSet
 from scipy.interpolate import BarycentricInterpolator
 
-from pyomo_fesd.core import interpolation_weights, kept_values, moving_grids, number_of
+from pyomo_fesd.core import interpolation_weights, kept_values, moving_grids, number_of, variables_of
 from pyomo_fesd.results import SwitchingFunction, jumps_that_happen, largest_value
 
 #: A function below this part of its largest value is zero all along an element.
@@ -152,7 +151,7 @@ def _interpolated_between_points(functions, tau, after):
     after : ComponentMap
         values on the left of states that have just jumped
     """
-    rows = [list(identify_variables(f, include_fixed=True)) for f in functions]
+    rows = [list(variables_of([f])) for f in functions]
     points = [[after.get(v, v.value) for v in rows[0]], *([v.value for v in row] for row in rows[1:])]
     columns = np.array(list(zip(*points)), dtype=float).reshape(-1, len(tau))
     found = []

@@ -5,7 +5,7 @@ Leaves: nothing.
 Does not apply: to functions that casadi does not have, if-then-else, and numbers that are not finite.
 """
 
-from functools import cache, reduce
+from functools import cache, partial, reduce
 from math import isfinite
 
 import casadi as ca
@@ -21,7 +21,7 @@ def _binary(code):
 
 
 def _sum(node, args):
-    return reduce(lambda a, b: ca.SX.binary(ca.OP_ADD, a, b), args, ca.SX(0))
+    return reduce(partial(ca.SX.binary, ca.OP_ADD), args)
 
 
 def _function(node, args):
@@ -50,26 +50,20 @@ class Unsupported(Exception):
 
 
 class CasadiExpressions:
-    """Writes expressions with ``symbols`` (by the id of a variable).
-
-    Attributes
-    ----------
-    met : dict id -> VarData
-        the variables of the expressions so far, in the order of their first occurrence
-    """
+    """Writes expressions with ``symbols`` (by the id of a variable)."""
 
     def __init__(self, symbols: dict):
-        self._symbols, self.met = symbols, {}
+        self._symbols, self._numbers = symbols, {}
 
-    def of(self, expr) -> ca.SX:
-        """Return ``expr`` with symbols.
+    def of(self, expr, met: dict) -> ca.SX:
+        """Return ``expr`` with symbols; ``met`` receives its variables by their ids.
 
         Raises
         ------
         Unsupported
         """
         stack = []
-        for token in reversed(self._prefix(expr)):
+        for token in reversed(self._prefix(expr, met)):
             if token.__class__ is tuple:
                 operation, node, count = token
                 arguments = stack[-count:]
@@ -78,19 +72,19 @@ class CasadiExpressions:
             stack.append(token)
         return stack.pop()
 
-    def _prefix(self, expr):
+    def _prefix(self, expr, met):
         """Operations before their arguments, the last of these first."""
         tokens, waiting = [], [expr]
         while waiting:
             node = waiting.pop()
             kind = node.__class__
-            if kind in native_numeric_types:
-                tokens.append(_number(node))
+            if kind in native_numeric_types or node is None:
+                tokens.append(self._number(node))
             elif kind is VarData or node.is_variable_type():
-                self.met.setdefault(id(node), node)
+                met[id(node)] = node
                 tokens.append(self._symbols[id(node)])
             elif not node.is_expression_type():
-                tokens.append(_number(value(node, exception=False)))
+                tokens.append(self._number(value(node, exception=False)))
             elif node.is_named_expression_type():
                 waiting.append(node.expr)
             else:
@@ -99,11 +93,14 @@ class CasadiExpressions:
                 waiting.extend(arguments)
         return tokens
 
-
-def _number(number):
-    if number is None or isinstance(number, complex) or not isfinite(number):
-        raise Unsupported(number)
-    return ca.SX(float(number))
+    def _number(self, number):
+        # casadi takes longer to make a number than to add two
+        found = self._numbers.get(number)
+        if found is None:
+            if number is None or isinstance(number, complex) or not isfinite(number):
+                raise Unsupported(number)
+            found = self._numbers[number] = ca.SX(float(number))
+        return found
 
 
 @cache

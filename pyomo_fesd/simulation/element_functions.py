@@ -73,7 +73,7 @@ class ElementRows:
     """
 
     def __init__(self, pattern: ElementEquations, symbols: dict):
-        self._symbols, self._unknown = symbols, set(map(id, pattern.unknown))
+        self._writer, self._unknown = CasadiExpressions(symbols), set(map(id, pattern.unknown))
         self.distances, self.unknown, self.sides, self.written, self.met = [], [], [], [], {}
         rows = [(row, self._row(row)) for row in pattern.rows]
         events = [[self._row(row) for row in some] for some in pattern.event_functions.values()]
@@ -86,10 +86,10 @@ class ElementRows:
 
     def _row(self, row):
         """Numbers of the distances of one row; none if it has known values only."""
-        writer = CasadiExpressions(self._symbols)
-        parts = [writer.of(part) for part in row.args]
-        self.met.update(writer.met)
-        unknown = [v for k, v in writer.met.items() if k in self._unknown]
+        met = {}
+        parts = [self._writer.of(part, met) for part in row.args]
+        self.met.update(met)
+        unknown = [v for k, v in met.items() if k in self._unknown]
         begin = len(self.distances)
         for low, high in zip(parts, parts[1:]) if unknown else ():
             self.distances.append(high - low)
@@ -97,10 +97,8 @@ class ElementRows:
         return range(begin, len(self.distances))
 
     def _side(self, side):
-        writer = CasadiExpressions(self._symbols)
-        self.sides.append(writer.of(side))
+        self.sides.append(self._writer.of(side, self.met))
         self.written.append(side)
-        self.met.update(writer.met)
         return len(self.sides) - 1
 
 

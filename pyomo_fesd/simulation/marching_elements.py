@@ -149,7 +149,9 @@ class MarchingElements:
     def _start_again(self, interval, moves, last):
         """Give the first place the values of the ``last`` element, which it returns at its new place."""
         for to, source in moves:
-            to.set_value(source.value, skip_validation=True)
+            # most indicators stay as they are, and take long to set
+            if to.value != source.value:
+                to.set_value(source.value, skip_validation=True)
         first, (_, left, length) = interval.places[0], last
         self._moving.r[first.n].set_value(length / first.length, skip_validation=True)
         return first, left, length
