@@ -2,7 +2,8 @@
 
 An element depends on what lies before it by the values at its left boundary only.  So a few places are enough for any number of
 elements with the same equations.  Each interval between two boundaries that keep their time (of control stages, breakpoints of
-signals, fixed points) has E places, and one element for the rest, which is never solved:
+signals, fixed points) has E places, and one element for the rest, which is never solved.  A single interval may have two places
+and no rest, if these have the same equations:
 
     solve 1..E,   take down,   values of E -> 1,   solve 2..E,   take down,   values of E -> 1, ...            until its end
 
@@ -76,7 +77,8 @@ class MarchingElements:
         self._timer, self._moving, self._first = timer, moving_grids(model)[times.wrt], times.wrt.first()
         self._intervals = list(_intervals(self._moving.grid, numbers))
         self._progress = Progress(times.wrt, self._moving.grid.stages, deadline)
-        self._solver = ElementSolver(model, times, inputs, options, timer, self._progress)
+        lengths = {place.n: interval.h for interval in self._intervals for place in interval.places}
+        self._solver = ElementSolver(model, times, inputs, options, timer, self._progress, lengths)
         for interval in self._intervals:
             if not self._solver.are_alike(interval.compared) or _expressions_differ(model, times, interval.places):
                 raise ElementsDiffer

@@ -1,7 +1,8 @@
 """Simulate a model that has no elements: they are laid, simulated, and taken away again.
 
 Where the elements between two boundaries that keep their time have the same equations, a few of them are laid and march
-(``marching_elements``).  All of them are where states jump at their boundaries (``state_jump``, contacts), and where equations or
+(``marching_elements``): two on the whole of a single interval, where these have the same equations although one contains the first
+and one the last time; else a few at the beginning of each interval.  All of them are laid where states jump at their boundaries (``state_jump``, contacts), and where equations or
 results contain the time itself, data over time or an ``Integral``.
 
 Takes: a model before ``fesd.finite_elements``; ``fesd.dcs`` is applied while it is simulated.
@@ -92,6 +93,7 @@ class WithoutGrid:
 
     def _marched(self, known, march):
         """The trajectory of elements that march; None if they differ."""
+        # the fewer places, the sooner the march begins
         found = self._marched_on(known, march, self._lay_two) if self._may_march_on_two() else None
         return self._marched_on(known, march, self._lay_few) if found is None else found
 

@@ -38,13 +38,13 @@ SMALL = 100
 AUTO, STARTS, COEFFICIENTS, USER = NATURAL_UNITS = ('auto', 'starts', 'coefficients', 'user')
 
 
-def assemble(problem, rows, symbols, factors, natural, expanded=False):
+def assemble(problem, rows, symbols, factors, natural):
     """The ``MpccFunctions`` of ``problem`` from its ``ModelRows``; ``factors`` are the user's.
 
-    ``natural`` says by what the others are scaled, as in ``compile_mpcc``; functions are SX if ``expanded``.
+    ``natural`` says by what the others are scaled, as in ``compile_mpcc``.
     """
     by_starts = natural == STARTS or (natural == AUTO and bool(problem.hints.alike))
-    assembly = _Assembly(problem, rows, symbols, factors, expanded)
+    assembly = _Assembly(problem, rows, symbols, factors)
     scaled = assembly.by_starts() if by_starts else assembly.by_user()
     compiled = assembly.functions(scaled)
     if natural == USER:
@@ -77,7 +77,7 @@ class _Factors:
 class _Assembly:
     """The functions of one MPCC, whatever their factors."""
 
-    def __init__(self, problem, rows, symbols, factors, expanded):
+    def __init__(self, problem, rows, symbols, factors):
         self._problem, self._rows, self._factors = problem, rows, factors
         self._parameters = symbols.parameters
         self._variables, self._constraints = rows.variables, [symbols.original(c) for c in rows.constraints]
@@ -85,7 +85,7 @@ class _Assembly:
         self._start, _ = start_values(self._variables)
         self._p = parameter_values(self._parameters)
         size = sum(functions.size for functions in (rows.cost, rows.rows, rows.sides, rows.others))
-        self._kind = ca.SX if expanded or size <= LARGE else ca.MX
+        self._kind = ca.SX if size <= LARGE else ca.MX
         self._slopes = {}
 
     def by_user(self):
