@@ -75,6 +75,8 @@ class MovingGrid(AutoSlots.Mixin):
         the pairs of step equilibration, by element
     state_jumps : StateJumps or None
     hysteresis : Hysteresis or None
+    explicit_time : tuple of str
+        names of what depends on the time label
     instants : dict
         physical time -> ``Instant``
     begin : float or None
@@ -104,6 +106,7 @@ class MovingGrid(AutoSlots.Mixin):
         'equilibration',
         'state_jumps',
         'hysteresis',
+        'explicit_time',
         'instants',
         'begin',
         'known',
@@ -113,7 +116,7 @@ class MovingGrid(AutoSlots.Mixin):
         for name in self.__slots__:
             setattr(self, name, None)
         self.wrt, self.block, self.grid = wrt, block, grid
-        self.complementarities, self.instants, self.known = [], {}, 0
+        self.complementarities, self.explicit_time, self.instants, self.known = [], (), {}, 0
         self.sources, self.splits, self.split_sources = ComponentMap(), ComponentMap(), ComponentMap()
 
     @property

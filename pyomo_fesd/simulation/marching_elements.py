@@ -42,6 +42,10 @@ class ElementsDiffer(Exception):
     """The elements have different equations, so each needs a place of its own."""
 
 
+class TimeInElements(ElementsDiffer):
+    """Their equations contain the time label, wherever the elements are."""
+
+
 @dataclass(frozen=True)
 class _Interval:
     """One interval between two boundaries that keep their time.
@@ -79,6 +83,9 @@ class MarchingElements:
         self._progress = Progress(times.wrt, self._moving.grid.stages, deadline)
         lengths = {place.n: interval.h for interval in self._intervals for place in interval.places}
         self._solver = ElementSolver(model, times, inputs, options, timer, self._progress, lengths)
+        # what has the period of the places is equal in all of them
+        if self._moving.explicit_time:
+            raise TimeInElements
         for interval in self._intervals:
             if not self._solver.are_alike(interval.compared) or _expressions_differ(model, times, interval.places):
                 raise ElementsDiffer
@@ -211,5 +218,5 @@ def _intervals(grid, numbers) -> Iterator[_Interval]:
 def _expressions_differ(model, times, places):
     """Whether a named expression, which no equation need contain, has other numbers in other elements."""
     named = times.families_in(own_components(model, Expression, Block)).values()
-    at_points = ([(some[place.points[0]],) for place in places if place.points[0] in some] for some in named)
+    at_points = ([(some[t],) for place in places for t in place.points if t in some] for some in named)
     return any(len(expressions) > 1 and differ(expressions) for expressions in at_points)

@@ -1,7 +1,7 @@
 """``simulate`` on a model without elements: the answers of the whole grid, and the model as it was."""
 
 import threading
-from math import log
+from math import log, pi, sin
 
 import bouncing_ball
 import gas_liquid_tank
@@ -485,3 +485,32 @@ def test_without_anything_that_switches(laid):
     assert laid == TWO
     assert frame['y'].to_numpy() == pytest.approx(np.exp(-frame.index), abs=1e-6)
     assert pyomo_fesd.switches(frame) == []
+
+
+@pytest.mark.parametrize('written', ['equation', 'named expression'])
+def test_numbers_with_the_period_of_two_places(written, laid):
+    m = over_time(2, y=1.0)
+    m.wave = pyo.Expression(m.t, rule=lambda m, t: sin(2 * pi * t) + 2)
+    m.decay = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == -(m.wave[t] if written == 'equation' else 1) * m.y[t])
+    frame = pyomo_fesd.simulate(m, nfe=20, ncp=3)
+    assert laid[-1] == 20
+    rate = frame['wave'].to_numpy() if 'wave' in frame else np.full(len(frame), np.nan)
+    assert np.ptp(rate) > 1.5
+
+
+def test_one_point_in_each_element(laid):
+    m = over_time(1, y=1.0)
+    m.decay = pyo.Constraint(m.t, rule=lambda m, t: m.dy[t] == -m.y[t])
+    pyomo_fesd.simulate(m, nfe=20, ncp=1)
+    assert laid == FEW
+
+
+@pytest.mark.parametrize('part', [1e-3, 1e-6])
+@pytest.mark.parametrize('above', [1.0, -2.0])
+def test_a_switch_just_before_the_end_of_a_short_element(part, above):
+    nfe, h = 1000, 0.01
+    switch = 333 * h - part * h
+    m = over_time(nfe * h, x=-switch)
+    m.mode = Disjunction(m.t, rule=lambda m, t: [[m.x[t] <= 0, m.dx[t] == 1], [m.x[t] >= 0, m.dx[t] == above]])
+    frame = pyomo_fesd.simulate(m, nfe=nfe, ncp=2)
+    assert [s.time for s in pyomo_fesd.switches(frame)] == pytest.approx([switch], abs=1e-9 * h)
