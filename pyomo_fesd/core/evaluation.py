@@ -24,6 +24,7 @@ from pyomo.core.expr import (
 from pyomo.core.expr.visitor import identify_mutable_parameters
 
 from pyomo_fesd.core.interruption import DeferredInterrupt
+from pyomo_fesd.core.node_search import leaves_of
 
 #: Nodes that are evaluated without Pyomo's visitor, which takes longer to set up than they do.
 EVALUATED = {
@@ -117,6 +118,12 @@ def variables_that_count(expression) -> Iterator[VarData]:
 
 def _vanishes(node):
     """Whether a product has a factor that is fixed to 0."""
-    return isinstance(node, ProductExpression) and any(
-        a == 0 if a.__class__ in native_numeric_types else a.is_fixed() and value_or_nan(a) == 0 for a in node.args
-    )
+    return isinstance(node, ProductExpression) and any(map(_is_fixed_to_zero, node.args))
+
+
+def _is_fixed_to_zero(factor):
+    if factor.__class__ in native_numeric_types:
+        return factor == 0
+    if factor.__class__ is VarData:
+        return factor.fixed and factor.value == 0
+    return not any(v.is_variable_type() and not v.fixed for v in leaves_of(factor)) and value_or_nan(factor) == 0
