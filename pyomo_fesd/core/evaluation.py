@@ -8,14 +8,29 @@ from pyomo.common.errors import InfeasibleConstraintException, IntervalException
 from pyomo.common.numeric_types import native_numeric_types
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
 from pyomo.core import value
+from pyomo.core.base.expression import ExpressionData, ScalarExpression
 from pyomo.core.base.var import VarData
-from pyomo.core.expr import LinearExpression, MonomialTermExpression, NegationExpression, ProductExpression, SumExpression
+from pyomo.core.expr import (
+    AbsExpression,
+    DivisionExpression,
+    LinearExpression,
+    MonomialTermExpression,
+    NegationExpression,
+    PowExpression,
+    ProductExpression,
+    SumExpression,
+    UnaryFunctionExpression,
+)
 from pyomo.core.expr.visitor import identify_mutable_parameters
 
 from pyomo_fesd.core.interruption import DeferredInterrupt
+from pyomo_fesd.core.node_search import leaves_of
 
-#: Operations that are evaluated without Pyomo's visitor, which takes longer to set up than they do.
-ARITHMETIC = {LinearExpression, MonomialTermExpression, NegationExpression, ProductExpression, SumExpression}
+#: Nodes that are evaluated without Pyomo's visitor, which takes longer to set up than they do.
+EVALUATED = {
+    *(LinearExpression, MonomialTermExpression, NegationExpression, ProductExpression, SumExpression),
+    *(DivisionExpression, PowExpression, UnaryFunctionExpression, AbsExpression, ExpressionData, ScalarExpression),
+}
 
 
 def number_of(expr) -> float:
@@ -25,15 +40,15 @@ def number_of(expr) -> float:
 
 
 def _number(expr):
-    """The value, or None where a variable has none."""
+    """The value, or None where a variable has none or a function is undefined."""
     kind = expr.__class__
     if kind is VarData:
         return expr.value
-    if kind not in ARITHMETIC:
+    if kind not in EVALUATED:
         return expr if kind in native_numeric_types else value(expr, exception=False)
     try:
         return expr._apply_operation([_number(arg) for arg in expr.args])
-    except TypeError:
+    except (TypeError, ValueError):
         return None
     except RecursionError:
         return value(expr, exception=False)
@@ -103,6 +118,12 @@ def variables_that_count(expression) -> Iterator[VarData]:
 
 def _vanishes(node):
     """Whether a product has a factor that is fixed to 0."""
-    return isinstance(node, ProductExpression) and any(
-        a == 0 if a.__class__ in native_numeric_types else a.is_fixed() and value_or_nan(a) == 0 for a in node.args
-    )
+    return isinstance(node, ProductExpression) and any(map(_is_fixed_to_zero, node.args))
+
+
+def _is_fixed_to_zero(factor):
+    if factor.__class__ in native_numeric_types:
+        return factor == 0
+    if factor.__class__ is VarData:
+        return factor.fixed and factor.value == 0
+    return not any(v.is_variable_type() and not v.fixed for v in leaves_of(factor)) and value_or_nan(factor) == 0

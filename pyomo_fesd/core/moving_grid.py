@@ -14,6 +14,7 @@ from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core.grid import Element, Grid
+from pyomo_fesd.core.own_data import declared
 
 _SCOPE = 'pyomo_fesd.core.moving_grid'
 
@@ -74,6 +75,8 @@ class MovingGrid(AutoSlots.Mixin):
         the pairs of step equilibration, by element
     state_jumps : StateJumps or None
     hysteresis : Hysteresis or None
+    explicit_time : tuple of str
+        names of what depends on the time label
     instants : dict
         physical time -> ``Instant``
     begin : float or None
@@ -103,6 +106,7 @@ class MovingGrid(AutoSlots.Mixin):
         'equilibration',
         'state_jumps',
         'hysteresis',
+        'explicit_time',
         'instants',
         'begin',
         'known',
@@ -112,7 +116,7 @@ class MovingGrid(AutoSlots.Mixin):
         for name in self.__slots__:
             setattr(self, name, None)
         self.wrt, self.block, self.grid = wrt, block, grid
-        self.complementarities, self.instants, self.known = [], {}, 0
+        self.complementarities, self.explicit_time, self.instants, self.known = [], (), {}, 0
         self.sources, self.splits, self.split_sources = ComponentMap(), ComponentMap(), ComponentMap()
 
     @property
@@ -200,7 +204,7 @@ def add_moving_grid(moving: MovingGrid) -> None:
 
 def _embedded_models(model: Block) -> Iterator[Model]:
     """Yield the models that are blocks of ``model``, as in the extensive form of a stochastic program, and those in them."""
-    for block in model.component_objects(Block, descend_into=False):
+    for block in declared(model, {Block}):
         if isinstance(block, Model):
             yield block
             yield from _embedded_models(block)

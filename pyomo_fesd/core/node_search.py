@@ -36,14 +36,14 @@ def contains_node(expr, sought: frozenset, enter=None) -> bool:
 
 
 def leaves_of(expr) -> Iterator:
-    """Yield the variables, Params and units in ``expr``, as often as they occur."""
+    """Yield the variables, Params and units in ``expr`` from left to right, as often as they occur."""
     waiting = [expr]
     while waiting:
         node = waiting.pop()
         if node.__class__ in native_types:
             continue
         if node.is_expression_type():
-            waiting.extend(node.args)
+            waiting.extend(node.args[::-1])
         else:
             yield node
 

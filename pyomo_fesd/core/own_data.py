@@ -5,9 +5,10 @@ Leaves: nothing.
 Does not apply: where the user has named components, which may be References.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 
 from pyomo.core import Block, Var
+from pyomo.core.base.block import BlockData
 
 
 def own_components(block: Block, ctype, descend_into, active: bool | None = None) -> Iterator:
@@ -37,8 +38,24 @@ def components_reader(block: Block, ctypes: frozenset, active: bool | None = Non
     return read
 
 
+def declared(block: Block, types: Collection) -> Iterable:
+    """Return the components of some ``types`` on ``block`` itself."""
+    # most blocks have none: Pyomo takes longer to make a map than to read it
+    return () if block._ctypes.keys().isdisjoint(types) else block.component_map(types).values()
+
+
 def _is_reference(component):
     return component.is_indexed() and component.is_reference()
+
+
+def own_blocks(block: Block, descend_into: Collection, active: bool | None = None) -> Iterator[BlockData]:
+    """Yield ``block`` and the blocks below it of the types ``descend_into``, each before those inside it."""
+    waiting = [block] if active is None or block.active == active else []
+    while waiting:
+        place = waiting.pop()
+        yield place
+        found = [b for c in declared(place, descend_into) if not _is_reference(c) for b in c.values()]
+        waiting += [b for b in reversed(found) if active is None or b.active == active]
 
 
 def own_data(block: Block, ctype, descend_into, active: bool | None = None) -> Iterator:

@@ -6,8 +6,12 @@ from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block
 from pyomo.gdp import Disjunct
 
+from pyomo_fesd.core.own_data import own_blocks
+
 #: Beginning of the scopes of our records.
 OURS = 'pyomo_fesd'
+#: Types of blocks with records that are read, and with all that are restored.
+BLOCKS, PLACES = {Block}, {Block, Disjunct}
 #: Containers in records -> a copy of one.
 COPIES = {
     list: list,
@@ -22,7 +26,7 @@ def records_below(model: Block, scope: str) -> Iterator[object]:
 
     Pyomo's own ``private_data`` creates an empty record on every block that it is asked for; this function only reads.
     """
-    for block in model.block_data_objects(active=True, descend_into=Block):
+    for block in own_blocks(model, BLOCKS, active=True):
         # pyomo.dae adds active data to a Block that is deactivated as a whole
         if block._private_data and scope in block._private_data and block.parent_component().active:
             yield block._private_data[scope]
@@ -44,7 +48,7 @@ def remember_records(model: Block) -> Callable[[], None]:
 
 
 def _all_records(model):
-    for block in model.block_data_objects(descend_into=(Block, Disjunct)):
+    for block in own_blocks(model, PLACES):
         for scope, record in (block._private_data or {}).items():
             if scope.startswith(OURS):
                 yield block, scope, record

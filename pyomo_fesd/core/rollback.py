@@ -3,11 +3,15 @@
 Each function ``_remember_...`` records one aspect of the model and returns the function that restores it.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from itertools import chain
 
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, BooleanVar, Constraint, Expression, Objective, Param, Set, Var
+from pyomo.core.base.component import ActiveComponent
+from pyomo.core.base.indexed_component import ActiveIndexedComponent
 from pyomo.core.base.set import FiniteSetData
 from pyomo.dae import ContinuousSet, DerivativeVar, Integral
 from pyomo.gdp import Disjunct
@@ -15,7 +19,7 @@ from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core.generated import is_generated
 from pyomo_fesd.core.interruption import DeferredInterrupt
-from pyomo_fesd.core.own_data import own_data
+from pyomo_fesd.core.own_data import data_of, own_blocks
 from pyomo_fesd.core.private_data import remember_records
 
 PLACES = (Block, Disjunct)
@@ -64,24 +68,38 @@ def restored(block: Block, wrt: ContinuousSet | None = None) -> Iterator[None]:
 
 def _remembered(model, wrt):
     """The functions that restore the model, called on exit."""
-    undo = ExitStack()
+    undo, blocks = ExitStack(), list(own_blocks(model, PLACES))
+    components = _by_type(blocks)
     # in reverse order of the restoration
-    undo.callback(_remember_types(model))
+    undo.callback(_remember_types(model, components))
     if wrt is not None:
         undo.callback(_remember_points(wrt))
     undo.callback(remember_records(model))
-    undo.callback(_remember_active(model))
-    undo.callback(_remember_indices(model))
-    undo.callback(_remember_values(model))
-    undo.callback(_remember_components(model))
-    undo.callback(_remember_statements(model))
+    undo.callback(_remember_active(components))
+    undo.callback(_remember_indices(components))
+    undo.callback(_remember_values(components))
+    undo.callback(_remember_components(blocks))
+    undo.callback(_remember_statements(components))
     return undo
 
 
-def _remember_values(model) -> Callable[[], None]:
-    found = (v for ctype in VARIABLES for v in own_data(model, ctype, PLACES))
-    variables = [(v, v.value, v.stale, v.fixed) for v in found]
-    params = (p for p in model.component_objects(Param, descend_into=PLACES) if p.mutable)
+def _by_type(blocks):
+    """The components of the ``blocks`` by their type."""
+    found = defaultdict(list)
+    for block in blocks:
+        for component in block.component_map().values():
+            found[component.ctype].append(component)
+    return found
+
+
+def _data(components, ctype):
+    """The data of the components of a type; a Reference only names data of others."""
+    return (data for c in components[ctype] if not (c.is_indexed() and c.is_reference()) for data in data_of(c))
+
+
+def _remember_values(components) -> Callable[[], None]:
+    variables = [(v, v.value, v.stale, v.fixed) for ctype in VARIABLES for v in _data(components, ctype)]
+    params = (p for p in components[Param] if p.mutable)
     params = [(data, data._value) for p in params for data in p._data.values()]
 
     def restore():
@@ -97,11 +115,10 @@ def _remember_values(model) -> Callable[[], None]:
     return restore
 
 
-def _remember_statements(model):
+def _remember_statements(components):
     """What Constraints, Objectives, named Expressions and Complementarities state."""
-    stated = [
-        (data, getattr(data, attribute, None)) for ctype, attribute in STATEMENTS.items() for data in own_data(model, ctype, PLACES)
-    ]
+    found = ((data, attribute) for ctype, attribute in STATEMENTS.items() for data in _data(components, ctype))
+    stated = [(data, getattr(data, attribute, None)) for data, attribute in found]
 
     def restore():
         for data, content in stated:
@@ -111,8 +128,8 @@ def _remember_statements(model):
     return restore
 
 
-def _remember_components(model):
-    names = ComponentMap((b, set(b.component_map())) for b in model.block_data_objects(descend_into=PLACES))
+def _remember_components(blocks):
+    names = ComponentMap((b, set(b.component_map())) for b in blocks)
 
     def restore():
         for b, known in names.items():
@@ -122,11 +139,11 @@ def _remember_components(model):
     return restore
 
 
-def _remember_indices(model):
+def _remember_indices(components):
     """Indices of components, and members of generated Sets; a Reference follows the components that it refers to."""
-    indexed = (c for c in model.component_objects(descend_into=PLACES) if c.is_indexed() and not c.is_reference())
+    indexed = (c for c in chain.from_iterable(components.values()) if c.is_indexed() and not c.is_reference())
     indices = ComponentMap((c, set(c._data)) for c in indexed)
-    sets = (s for s in model.component_objects(Set, descend_into=PLACES) if is_generated(s) and isinstance(s, FiniteSetData))
+    sets = (s for s in components[Set] if is_generated(s) and isinstance(s, FiniteSetData))
     members = [(s, set(s)) for s in sets]
 
     def restore():
@@ -141,10 +158,11 @@ def _remember_indices(model):
     return restore
 
 
-def _remember_active(model):
-    active = [(c, c.active) for c in model.component_data_objects(descend_into=PLACES) if hasattr(c, 'deactivate')]
-    active += [(c, c.active) for c in model.component_objects(descend_into=PLACES) if hasattr(c, 'deactivate')]
-    transformed = [(d, d._transformation_block) for d in model.component_data_objects(Disjunct, descend_into=PLACES)]
+def _remember_active(components):
+    whole = [c for c in chain.from_iterable(components.values()) if isinstance(c, ActiveComponent)]
+    data = (d for c in whole if isinstance(c, ActiveIndexedComponent) for d in c.values())
+    active = [(c, c.active) for c in chain(whole, data)]
+    transformed = [(d, d._transformation_block) for d in _data(components, Disjunct)]
 
     def restore():
         for component, was in active:
@@ -169,11 +187,11 @@ def _remember_points(wrt):
     return restore
 
 
-def _remember_types(model):
+def _remember_types(model, components):
     """DerivativeVars and Integrals, which become Vars and Expressions; Integrals are built again over the remaining points."""
     # Pyomo's getter would make an expression of the original, which a clone of the model then keeps
-    derivatives = [(d, d.__dict__.get('_expr')) for d in model.component_objects(DerivativeVar, descend_into=PLACES)]
-    integrals = list(model.component_objects(Integral, descend_into=PLACES))
+    derivatives = [(d, d.__dict__.get('_expr')) for d in components[DerivativeVar]]
+    integrals = list(components[Integral])
 
     def restore():
         for derivative, expression in derivatives:

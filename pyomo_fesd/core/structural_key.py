@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from pyomo.common.collections import ComponentSet
 from pyomo.common.numeric_types import native_numeric_types, native_types
 from pyomo.core import value
-from pyomo.core.expr.visitor import identify_variables
 
 from pyomo_fesd.core.expression_key import detail_of
+from pyomo_fesd.core.node_search import leaves_of
 
 
 def variables_of(expressions: Iterable) -> ComponentSet:
@@ -20,7 +20,7 @@ def variables_of(expressions: Iterable) -> ComponentSet:
     found = ComponentSet()
     for e in expressions:
         if hasattr(e, 'is_expression_type'):
-            found.update(identify_variables(e, include_fixed=True))
+            found.update(leaf for leaf in leaves_of(e) if leaf.is_variable_type())
     return found
 
 

@@ -10,10 +10,12 @@ from pyomo.dae import ContinuousSet, DerivativeVar
 from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd.core.errors import FesdError
-from pyomo_fesd.core.own_data import data_of
+from pyomo_fesd.core.own_data import data_of, declared
 
 #: Endings of the names of pyomo.dae's own equations.
 DISCRETISATION = ('_disc_eq', '_cont_eq')
+#: Types of components on a block.
+VARIABLES, DISJUNCTIONS, BLOCKS = {Var, DerivativeVar}, {Disjunction}, {Block, Disjunct}
 
 
 def index_tuple(index) -> tuple:
@@ -284,7 +286,7 @@ def derivatives(block, wrt):
     Blocks over ``wrt`` are not searched: they are many, and a derivative lies beside its state, which is over all times.
     """
     for place in _blocks_without_time(block, wrt):
-        for var in place.component_objects((Var, DerivativeVar), descend_into=False):
+        for var in declared(place, VARIABLES):
             if isinstance(var, DerivativeVar) and any(s is wrt for s in var.get_continuousset_list()):
                 yield var
 
@@ -292,8 +294,8 @@ def derivatives(block, wrt):
 def _blocks_without_time(block, wrt):
     """``block`` and those below it that ``wrt`` does not index, without the disjuncts of a Disjunction of mere expressions."""
     yield block
-    nameless = {id(d._autodisjuncts) for d in block.component_objects(Disjunction, descend_into=False)}
-    for inner in block.component_objects((Block, Disjunct), descend_into=False):
+    nameless = {id(d._autodisjuncts) for d in declared(block, DISJUNCTIONS)}
+    for inner in declared(block, BLOCKS):
         if not is_indexed_by(inner, wrt) and id(inner) not in nameless:
             for data in inner.values():
                 yield from _blocks_without_time(data, wrt)

@@ -7,3 +7,4 @@ Read ``transformation.py`` (keywords and reverse maps), then ``writer.py``, whic
 """
 
 from pyomo_fesd.dcs.transformation import DynamicComplementaritySystem
+from pyomo_fesd.dcs.writer import continues_everywhere

@@ -7,9 +7,10 @@ from pyomo.common.collections import ComponentSet
 from pyomo.common.gc_manager import PauseGC
 from pyomo.core import Block
 from pyomo.core.base.block import BlockData
+from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunction
 
-from pyomo_fesd.core import FesdError, TimeIndex, TimeWriter
+from pyomo_fesd.core import FesdError, TimeIndex, TimeWriter, switched_systems
 from pyomo_fesd.dcs.blending import blend, dcs_block
 from pyomo_fesd.dcs.exclusion_pairs import write_exclusions
 from pyomo_fesd.dcs.forms import heaviside, hysteresis, stewart
@@ -80,6 +81,12 @@ class DcsWriter(TimeWriter):
         """Return a function that replaces the piecewise functions of an integrand of ``owner``."""
         rewriter = PiecewiseRewriter(self.block, TimeIndex(self.wrt), ExitStack())
         return lambda expression: rewriter.replaced(expression, owner)
+
+
+def continues_everywhere(block: Block, wrt: ContinuousSet) -> bool:
+    """Return whether ``fesd.dcs``, applied to all of ``block``, waits for points of ``wrt``: then it writes all that is left."""
+    waiting = switched_systems(block).waiting
+    return any(isinstance(w, DcsWriter) and w.wrt is wrt and len(w.targets) == 1 and w.targets[0] is block for w in waiting)
 
 
 def _one_block(instance):

@@ -12,16 +12,15 @@ Does not apply: to sides of a hand-written Complementarity.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 
 import numpy as np
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, value
-from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import ContinuousSet
 from scipy.interpolate import BarycentricInterpolator
 
-from pyomo_fesd.core import interpolation_weights, kept_values, moving_grids, number_of
+from pyomo_fesd.core import interpolation_weights, kept_values, moving_grids, number_of, variables_of
 from pyomo_fesd.results import SwitchingFunction, jumps_that_happen, largest_value
 
 #: A function below this part of its largest value is zero all along an element.
@@ -31,8 +30,8 @@ SIGNIFICANT = 1e-6
 #: A slide ends smoothly if its multiplier arrives within this distance of its value in the next element.
 ARRIVED = 1e-2
 #: Relative times at which a function is evaluated, and those between them at which its interpolant is.
-NODES = (1 - np.cos(np.pi * (np.arange(12) + 0.5) / 12)) / 2
-INSIDE = np.linspace(0.0, 1.0, 202)[1:-1]
+NODES = tuple((1 - np.cos(np.pi * (np.arange(12) + 0.5) / 12)) / 2)
+INSIDE = tuple(np.linspace(0.0, 1.0, 202)[1:-1].tolist())
 
 
 def missed_crossings(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
@@ -132,8 +131,8 @@ def _crossing(kept, element, grid, after):
     if largest <= kept.zero or low > 2 * (high - low):
         return None  # zero throughout, or far from zero
     functions, jumping = [kept.by_label[t] for t in labels], after.get(element.n, ComponentMap())
-    at_nodes = _interpolated_between_points(functions, np.array([0.0, *grid.tau]), jumping)
-    values = sign * BarycentricInterpolator(NODES, at_nodes)(INSIDE)
+    at_nodes = _interpolated_between_points(functions, (0.0, *grid.tau), jumping)
+    values = sign * _interpolation(NODES, INSIDE) @ at_nodes
     if kept.leaves_smoothly(element, grid):
         values = np.where(np.logical_or.accumulate(values >= 0), values, 0.0)
     worst = int(np.argmin(values))
@@ -147,18 +146,24 @@ def _interpolated_between_points(functions, tau, after):
     ----------
     functions : list of expressions
         the function at the left boundary and at the collocation points
-    tau : array
+    tau : tuple of float
         their relative times
     after : ComponentMap
         values on the left of states that have just jumped
     """
-    rows = [list(identify_variables(f, include_fixed=True)) for f in functions]
+    rows = [list(variables_of([f])) for f in functions]
     points = [[after.get(v, v.value) for v in rows[0]], *([v.value for v in row] for row in rows[1:])]
-    polynomials = [BarycentricInterpolator(tau, column)(NODES) for column in zip(*points)]
+    columns = np.array(list(zip(*points)), dtype=float).reshape(-1, len(tau))
     found = []
     with kept_values(rows[-1]):
-        for at_node in zip(*polynomials) if polynomials else [()] * len(NODES):
+        for at_node in (_interpolation(tau, NODES) @ columns.T).tolist():
             for v, number in zip(rows[-1], at_node):
                 v.set_value(number, skip_validation=True)
-            found.append(value(functions[-1]))
+            found.append(number_of(functions[-1]))
     return np.array(found)
+
+
+@cache
+def _interpolation(nodes, others):
+    """The matrix that gives values of a polynomial at ``others`` by those at its ``nodes``."""
+    return BarycentricInterpolator(nodes, np.eye(len(nodes)))(others)

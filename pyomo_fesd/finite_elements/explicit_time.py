@@ -34,13 +34,14 @@ SAME = 1e-9
 
 
 def warn_explicit_time(moving: MovingGrid, expressions: Iterable[tuple]) -> None:
-    """Warn once for each of ``expressions_over_time`` whose numbers change with time.
+    """Warn once for each of ``expressions_over_time`` whose numbers change with time, and record its name.
 
     With every variable at one value, all points of a constraint without explicit time give the same number.  Control stages
     may have data of their own, so points are compared within a control stage.
     """
     stage = {t: k for k, elements in enumerate(moving.grid.control_stages) for e in elements for t in e.own_labels}
-    for name in dict.fromkeys(name for name, by_time in expressions if _depends_on_time(by_time, stage)):
+    moving.explicit_time = tuple(dict.fromkeys(name for name, by_time in expressions if _depends_on_time(by_time, stage)))
+    for name in moving.explicit_time:
         logger.warning(
             "%s: its numbers depend on the time label (a Param over time, or t itself in a rule). Labels are not physical "
             "time once elements move. Take time from a clock state, pyomo_fesd.clock(m, m.%s)[t], give a time series with "

@@ -15,11 +15,17 @@ from pyomo_fesd.mpcc.compile import (
     NATURAL_UNITS,
     Contradiction,
     Snapshot,
+    beside,
+    certain_constants,
     compile_mpcc,
     parameter_data,
     plain_nlp,
     read_mpcc,
+    row_factors,
+    side_factors,
     start_value,
+    variable_factors,
+    without_small,
 )
 from pyomo_fesd.mpcc.multistart import Multistart
 from pyomo_fesd.mpcc.nlp import Deadline, OutOfTime, PlainIpopt

@@ -7,7 +7,8 @@ without any: a few ``marching_elements`` in place of ``passes`` where all elemen
 
 One element: ``equation_reader`` reads its ``element_equations`` and tells which elements share compiled functions,
 ``determinacy`` refuses undetermined unknowns, ``element_class`` solves it: by Newton's method while the active set is known
-(``element_model``, ``element_residuals``, ``element_signs``, ``newton``, ``active_set_step``), by ``element_mpcc`` where it is not.
+(``casadi_expressions``, ``element_functions`` with their ``element_scale``, ``element_residuals``, ``element_signs``, ``newton``,
+``active_set_step``), by ``element_mpcc`` on an ``element_model`` of its own where it is not.
 ``largest_residuals`` explains failures.  ``first_guess`` is what ``mpec_hybrid`` calls where nothing is free.
 """
 

@@ -62,22 +62,27 @@ class LeftBoundary:
 
 
 class ElementClass:
-    """The class of elements with the equations of ``pattern`` and the ``nominal`` length, or the first time."""
+    """The class of elements with the equations of ``pattern`` and the ``nominal`` length, or the first time.
 
-    def __init__(self, pattern: ElementEquations, nominal: float | None, tau: tuple[float, ...], options: dict, timer, deadline):
-        self._pattern, self.nominal, self._tau = pattern, nominal, tau
+    ``unit`` is what the length multiplier is usually near.
+    """
+
+    def __init__(
+        self, pattern: ElementEquations, nominal: float | None, tau: tuple[float, ...], options: dict, timer, deadline, unit=1.0
+    ):
+        self._pattern, self.nominal, self._tau, self._unit = pattern, nominal, tau, unit
         self._options, self._timer, self._deadline, self._values = options, timer, deadline, None
 
     @cached_property
     def mpcc(self) -> ElementMpcc:
         """The element with complementarity."""
         with phase(self._timer, 'compile'):
-            return ElementMpcc(self._pattern, self._options, self._deadline)
+            return ElementMpcc(self._pattern, self._options, self._deadline, self._unit)
 
     @cached_property
     def _residuals(self):
         with phase(self._timer, 'compile'):
-            return ElementResiduals(self._pattern, self._tau, self._timer, self._options.get('user_scaling', True))
+            return ElementResiduals(self._pattern, self._tau, self._options.get('user_scaling', True))
 
     @cached_property
     def _stepper(self):

@@ -18,8 +18,6 @@ class ElementModel:
         with ``unknown``, ``known`` (fixed, at first with the ``typical`` values of ``pattern``) and ``row``
     length : VarData or None
         the length multiplier
-    event_rows : list of list of ConstraintData
-        one list for each event function; None for a row without unknowns
     """
 
     def __init__(self, pattern: ElementEquations):
@@ -38,9 +36,8 @@ class ElementModel:
             if factor is not None:
                 m.scaling_factor[self._copies[id(v)]] = factor
         m.row = pyo.ConstraintList()
-        for row in pattern.rows:
+        for row in pattern.all_rows:
             self._add(row, pattern, factors)
-        self.event_rows = [[self._add(row, pattern, factors) for row in rows] for rows in pattern.event_functions.values()]
         self.set_known(pattern)
         for v, number in pattern.typical.items():
             if id(v) in self._copies:
@@ -48,16 +45,15 @@ class ElementModel:
         m.known.fix()
 
     def _add(self, row, pattern, factors):
-        """Add a row; None if it contains known values only."""
+        """Add a row, unless it contains known values only."""
         unknown = [v for v in variables_of([row]) if self._copies[id(v)].parent_component() is self.model.unknown]
         if not unknown:
-            return None
+            return
         added = self.model.row.add(exchanged(row, self._copies))
         # the scale of a row is that of its variables, if the user has given all of them a factor
         given = [factors.get(v) for v in unknown if v is not pattern.length]
         if given and None not in given:
             self.model.scaling_factor[added] = min(given)
-        return added
 
     def add_pairs(self, name: str, pairs: Sequence[Pair]) -> None:
         """Add ``pairs`` to the model, as Complementarities ``name`` in their order."""

@@ -20,15 +20,20 @@ OPTIONS = {'raise_exception_on_nonoptimal_result': False, 'relaxation_iterations
 
 
 class ElementMpcc:
-    """The MPCC of the element class of ``pattern``; ``options`` are those of ``mpec_hybrid``, ``deadline`` is that of all."""
+    """The MPCC of the element class of ``pattern``; ``options`` are those of ``mpec_hybrid``, ``deadline`` is that of all.
 
-    def __init__(self, pattern: ElementEquations, options: dict, deadline: Deadline | None = None):
+    ``unit`` is what the length multiplier is usually near.
+    """
+
+    def __init__(self, pattern: ElementEquations, options: dict, deadline: Deadline | None = None, unit: float = 1.0):
         self._deadline = deadline or Deadline()
         self._copy = copy = ElementModel(pattern)
         self.model, self._length = copy.model, copy.length
         copy.add_pairs('cross', pattern.cross_pairs)
         if self._length is not None:
-            self.model.step = pyo.Objective(expr=self._length, sense=pyo.maximize)
+            self.model.step = pyo.Objective(expr=self._length if unit == 1 else self._length / unit, sense=pyo.maximize)
+            if unit != 1:
+                self.model.scaling_factor[self._length] = 1 / unit
         self._solver = SolverFactory('mpec_hybrid', **(OPTIONS | options))
         self._solver.set_instance(self.model, parameters=[self.model.known])
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import chain
+from math import log2
 
 from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, Var
@@ -20,9 +21,9 @@ from pyomo_fesd.simulation.progress import Progress
 from pyomo_fesd.simulation.sizes import Sizes
 from pyomo_fesd.simulation.step_sizes import SimulatedElement
 
-#: Parts of an element's length, or of the length aimed at if that is longer.  A step shorter than the first is none: the rest of a
-#: control stage after a switch may be as short as the solver's tolerances.  A step that misses its aim by more than the second has
-#: been cut short by an event.
+#: Parts of an element's usual length, or of the length aimed at if that is longer.  A step shorter than the first is none: the
+#: rest of a control stage after a switch may be as short as the solver's tolerances.  A step that misses its aim by more than the
+#: second has been cut short by an event.
 NO_STEP, CUT = 1e-9, 1e-7
 #: A given state jumps if it changes by more than the first part of its value, and so many times faster than to the element's end.
 JUMP, STEEP = 1e-6, 2.0
@@ -44,15 +45,17 @@ LEAST, BEYOND, LONGER = (1e-2, 1e-4), {'lpec': 'full', 'relaxation': 'elastic'},
 class ElementSolver:
     """Solves the elements of one moving grid in their order; errors say the ``progress``.
 
+    Parameters as of ``simulate``; ``lengths`` by the number of an element, where they are usually not near the nominal one.
+
     Attributes
     ----------
     given : ComponentSet
         variables with known values
     """
 
-    def __init__(self, model, times: TimeIndex, inputs, options, timer, progress: Progress):
+    def __init__(self, model, times: TimeIndex, inputs, options, timer, progress: Progress, lengths: dict | None = None):
         self._model, self._first, self._options, self._timer = model, times.wrt.first(), options, timer
-        self._times, self._progress = times, progress
+        self._times, self._progress, self._lengths = times, progress, lengths or {}
         self._moving = moving_grids(model)[times.wrt]
         self._grid, self._hysteresis = self._moving.grid, read_hysteresis(self._moving)
         self._jumps = JumpEvents(self._moving.state_jumps)
@@ -168,7 +171,7 @@ class ElementSolver:
         """Solve one element with a length of at most ``most``; returns its length and its ``ElementEnd``."""
         self._progress.check_time()
         equations = self._read(element)
-        element_class, longest = self._class_of(equations, element), max(most, element.length)
+        element_class, longest = self._class_of(equations, element), max(most, self._usual_length(element))
         found = element_class.newton_step(equations, self._end, most, lambda: self._left_boundary(equations, element))
         if found is None:
             found = self._mpcc_step(element_class, equations, most, TRIES[not warm :], NO_STEP * longest, element)
@@ -192,13 +195,18 @@ class ElementSolver:
     def _class_of(self, equations, element):
         if equations.element_class not in self._classes:
             refuse_undetermined(equations)
-        return self._class(equations, element.length, self._grid.tau)
+        # scaling by a power of 2 is exact
+        unit = 2.0 ** round(log2(self._usual_length(element) / element.length))
+        return self._class(equations, element.length, self._grid.tau, unit)
 
-    def _class(self, equations, nominal, tau):
+    def _usual_length(self, element):
+        return self._lengths.get(element.n, element.length)
+
+    def _class(self, equations, nominal, tau, unit=1.0):
         key = equations.element_class
         if key not in self._classes:
             equations = self._sized(equations)
-            self._classes[key] = ElementClass(equations, nominal, tau, self._options, self._timer, self._progress.deadline)
+            self._classes[key] = ElementClass(equations, nominal, tau, self._options, self._timer, self._progress.deadline, unit)
         return self._classes[key]
 
     def _learn_sizes(self):

@@ -2,7 +2,8 @@
 
 An element depends on what lies before it by the values at its left boundary only.  So a few places are enough for any number of
 elements with the same equations.  Each interval between two boundaries that keep their time (of control stages, breakpoints of
-signals, fixed points) has E places, and one element for the rest, which is never solved:
+signals, fixed points) has E places, and one element for the rest, which is never solved.  A single interval may have two places
+and no rest, if these have the same equations:
 
     solve 1..E,   take down,   values of E -> 1,   solve 2..E,   take down,   values of E -> 1, ...            until its end
 
@@ -41,6 +42,10 @@ class ElementsDiffer(Exception):
     """The elements have different equations, so each needs a place of its own."""
 
 
+class TimeInElements(ElementsDiffer):
+    """Their equations contain the time label, wherever the elements are."""
+
+
 @dataclass(frozen=True)
 class _Interval:
     """One interval between two boundaries that keep their time.
@@ -48,12 +53,15 @@ class _Interval:
     Attributes
     ----------
     places : list of Element
+    compared : list of Element
+        places whose equations have to be alike; the first of an interval may have others, if several follow
     begin, end : float
     h : float
         length of its elements
     """
 
     places: list[Element]
+    compared: list[Element]
     begin: float
     end: float
     h: float
@@ -73,9 +81,13 @@ class MarchingElements:
         self._timer, self._moving, self._first = timer, moving_grids(model)[times.wrt], times.wrt.first()
         self._intervals = list(_intervals(self._moving.grid, numbers))
         self._progress = Progress(times.wrt, self._moving.grid.stages, deadline)
-        self._solver = ElementSolver(model, times, inputs, options, timer, self._progress)
+        lengths = {place.n: interval.h for interval in self._intervals for place in interval.places}
+        self._solver = ElementSolver(model, times, inputs, options, timer, self._progress, lengths)
+        # what has the period of the places is equal in all of them
+        if self._moving.explicit_time:
+            raise TimeInElements
         for interval in self._intervals:
-            if not self._solver.are_alike(interval.places[1:]) or _expressions_differ(model, times, interval.places):
+            if not self._solver.are_alike(interval.compared) or _expressions_differ(model, times, interval.places):
                 raise ElementsDiffer
         self._over_time = list(times.families_in(own_components(model.model(), Var, (Block, Disjunct))).values())
         self._table, self._switches = ElementTable(model, times), ElementSwitches(model, times)
@@ -146,7 +158,9 @@ class MarchingElements:
     def _start_again(self, interval, moves, last):
         """Give the first place the values of the ``last`` element, which it returns at its new place."""
         for to, source in moves:
-            to.set_value(source.value, skip_validation=True)
+            # most indicators stay as they are, and take long to set
+            if to.value != source.value:
+                to.set_value(source.value, skip_validation=True)
         first, (_, left, length) = interval.places[0], last
         self._moving.r[first.n].set_value(length / first.length, skip_validation=True)
         return first, left, length
@@ -192,13 +206,17 @@ class MarchingElements:
 def _intervals(grid, numbers) -> Iterator[_Interval]:
     """The places of each interval are one stretch between boundaries that keep their time, and its last element the next one."""
     stretches = list(grid.stages.values())
+    if len(stretches) == 1:
+        (places,) = stretches
+        stretches = [places, places[-1:]]
     for places, (rest,), number in zip(stretches[0::2], stretches[1::2], numbers, strict=True):
         begin, end = places[0].left, rest.right
-        yield _Interval(places, float(begin), float(end), (end - begin) / number)
+        compared = places if rest in places else places[1:]
+        yield _Interval(places, compared, float(begin), float(end), (end - begin) / number)
 
 
 def _expressions_differ(model, times, places):
     """Whether a named expression, which no equation need contain, has other numbers in other elements."""
     named = times.families_in(own_components(model, Expression, Block)).values()
-    at_points = ([(some[place.points[0]],) for place in places if place.points[0] in some] for some in named)
+    at_points = ([(some[t],) for place in places for t in place.points if t in some] for some in named)
     return any(len(expressions) > 1 and differ(expressions) for expressions in at_points)

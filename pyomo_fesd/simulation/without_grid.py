@@ -1,8 +1,9 @@
 """Simulate a model that has no elements: they are laid, simulated, and taken away again.
 
 Where the elements between two boundaries that keep their time have the same equations, a few of them are laid and march
-(``marching_elements``).  All of them are where states jump at their boundaries (``state_jump``, contacts), and where equations or
-results contain the time itself, data over time or an ``Integral``.
+(``marching_elements``): two on the whole of a single interval, where these have the same equations although the second contains
+the last time; else a few at the beginning of each interval.  All of them are laid where states jump at their boundaries
+(``state_jump``, contacts), and where equations or results contain the time itself, data over time or an ``Integral``.
 
 Takes: a model before ``fesd.finite_elements``; ``fesd.dcs`` is applied while it is simulated.
 Leaves: the trajectory; values at the times that the ContinuousSet has.  All else on the model is as before.
@@ -30,10 +31,11 @@ from pyomo_fesd.core import (
     with_points,
     withheld_messages,
 )
+from pyomo_fesd.dcs import continues_everywhere
 from pyomo_fesd.finite_elements import FiniteElements
 from pyomo_fesd.results import SWITCHES, switches
 from pyomo_fesd.simulation.inputs import hold_first_values
-from pyomo_fesd.simulation.marching_elements import ElementsDiffer
+from pyomo_fesd.simulation.marching_elements import ElementsDiffer, TimeInElements
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -91,15 +93,27 @@ class WithoutGrid:
 
     def _marched(self, known, march):
         """The trajectory of elements that march; None if they differ."""
+        # the fewer places, the sooner the march begins
+        for lay in (self._lay_two, self._lay_few) if self._may_march_on_two() else (self._lay_few,):
+            try:
+                return self._marched_on(known, march, lay)
+            except TimeInElements:
+                return None
+            except ElementsDiffer:
+                continue
+        return None
+
+    def _marched_on(self, known, march, lay):
+        """The trajectory of elements that march on the places that ``lay`` makes."""
         with restored(self._model, self._wrt):
             with withheld_messages(logger.name) as messages:
-                self._lay_few()
+                lay()
             try:
                 run = march(self._numbers)
             except ElementsDiffer:
-                # the whole grid says the same again
+                # what is laid next says the same again
                 messages.clear()
-                return None
+                raise
             finally:
                 for message in messages:
                     logger.handle(message)
@@ -113,6 +127,18 @@ class WithoutGrid:
         integrals = root.component_objects(Integral, descend_into=(Block, Disjunct))
         systems = all_switched_systems(root)
         return worth and not (systems.resets or systems.contacts) and next(integrals, None) is None
+
+    def _may_march_on_two(self):
+        """Whether two places may do: in one interval, and without hysteresis, whose modes end at a boundary before the last.
+
+        With one point each, two places would not show numbers that change with time.
+        """
+        alone = len(self._numbers) == 1 and self._config.ncp > 1
+        return alone and not all_switched_systems(self._model.model()).hysteresis
+
+    def _lay_two(self):
+        """Lay two elements, with the ends of the only interval."""
+        self._lay(nfe=2, equilibration='none')
 
     def _lay_few(self):
         """Lay ``PLACES`` elements in each interval, and one for the rest of it."""
@@ -128,7 +154,8 @@ class WithoutGrid:
 
     def _lay(self, **changes):
         with phase(self._timer, 'transform'):
-            TransformationFactory('fesd.dcs').apply_to(self._model, wrt=self._wrt)
+            if not continues_everywhere(self._model, self._wrt):
+                TransformationFactory('fesd.dcs').apply_to(self._model, wrt=self._wrt)
             given = {name: self._config[name] for name in OPTIONS} | {'piecewise_constant': self._held} | changes
             TransformationFactory('fesd.finite_elements').apply_to(self._model, wrt=self._wrt, **given)
 

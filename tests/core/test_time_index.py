@@ -6,10 +6,10 @@ import pytest
 import signum
 from hypothesis import given
 from hypothesis import strategies as st
-from pyomo.core.base.block import BlockData
 from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd import FesdError
+from pyomo_fesd.core import time_index
 from pyomo_fesd.core.time_index import (
     TimeIndex,
     ancestry,
@@ -235,10 +235,8 @@ def test_disjuncts_of_expressions_are_passed_over_and_declared_ones_are_not(m, m
     m.mode['b'].y = pyo.Var(m.t)
     m.mode['b'].dy = dae.DerivativeVar(m.mode['b'].y)
     m.choice = Disjunction(m.t, rule=lambda m, t: [[m.x[t] >= 0, m.dx[t] == 1], [m.x[t] <= 0]])
-    searched, walk = [], BlockData.component_objects
-    monkeypatch.setattr(
-        BlockData, 'component_objects', lambda b, *args, **kwds: (searched.append(b.name), walk(b, *args, **kwds))[1]
-    )
+    searched, walk = [], time_index.declared
+    monkeypatch.setattr(time_index, 'declared', lambda b, types: (searched.append(b.name), walk(b, types))[1])
     assert [d.name for d in derivatives(m, m.t)] == ['dx', 'mode[b].dy']
     assert 'mode[a]' in searched and not any('choice_disjuncts' in name for name in searched)
 

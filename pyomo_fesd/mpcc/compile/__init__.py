@@ -18,5 +18,7 @@ from pyomo_fesd.mpcc.compile.derivatives import Derivatives, Outer, automatic, c
 from pyomo_fesd.mpcc.compile.model_values import Contradiction, start_value
 from pyomo_fesd.mpcc.compile.parameters import parameter_data
 from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc
+from pyomo_fesd.mpcc.compile.scaling import side_factors
+from pyomo_fesd.mpcc.compile.sizes import beside, certain_constants, row_factors, variable_factors, without_small
 from pyomo_fesd.mpcc.compile.sparse_entries import largest_entries, major_index, with_entries
 from pyomo_fesd.mpcc.compile.staleness import Snapshot

@@ -25,11 +25,10 @@ from pyomo_fesd.mpcc.compile.mpcc_functions import MpccFunctions
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.parameters import parameter_values
 from pyomo_fesd.mpcc.compile.part_indices import part_indices
-from pyomo_fesd.mpcc.compile.round_off import EXACT
 from pyomo_fesd.mpcc.compile.scaled_functions import LARGE, ScaledFunctions, ScaledRows
 from pyomo_fesd.mpcc.compile.scaling import Scale, side_factors
-from pyomo_fesd.mpcc.compile.sizes import beside, row_factors, variable_factors, without_small
-from pyomo_fesd.mpcc.compile.sparse_entries import largest_entries, with_entries
+from pyomo_fesd.mpcc.compile.sizes import beside, certain_constants, row_factors, variable_factors, without_small
+from pyomo_fesd.mpcc.compile.sparse_entries import largest_entries, major_index, with_entries
 
 UNBOUNDED = (-np.inf, np.inf)
 #: Variables of a nonlinear model that may be scaled by coefficients.
@@ -38,13 +37,13 @@ SMALL = 100
 AUTO, STARTS, COEFFICIENTS, USER = NATURAL_UNITS = ('auto', 'starts', 'coefficients', 'user')
 
 
-def assemble(problem, rows, symbols, factors, natural, expanded=False):
+def assemble(problem, rows, symbols, factors, natural):
     """The ``MpccFunctions`` of ``problem`` from its ``ModelRows``; ``factors`` are the user's.
 
-    ``natural`` says by what the others are scaled, as in ``compile_mpcc``; functions are SX if ``expanded``.
+    ``natural`` says by what the others are scaled, as in ``compile_mpcc``.
     """
     by_starts = natural == STARTS or (natural == AUTO and bool(problem.hints.alike))
-    assembly = _Assembly(problem, rows, symbols, factors, expanded)
+    assembly = _Assembly(problem, rows, symbols, factors)
     scaled = assembly.by_starts() if by_starts else assembly.by_user()
     compiled = assembly.functions(scaled)
     if natural == USER:
@@ -77,7 +76,7 @@ class _Factors:
 class _Assembly:
     """The functions of one MPCC, whatever their factors."""
 
-    def __init__(self, problem, rows, symbols, factors, expanded):
+    def __init__(self, problem, rows, symbols, factors):
         self._problem, self._rows, self._factors = problem, rows, factors
         self._parameters = symbols.parameters
         self._variables, self._constraints = rows.variables, [symbols.original(c) for c in rows.constraints]
@@ -85,7 +84,7 @@ class _Assembly:
         self._start, _ = start_values(self._variables)
         self._p = parameter_values(self._parameters)
         size = sum(functions.size for functions in (rows.cost, rows.rows, rows.sides, rows.others))
-        self._kind = ca.SX if expanded or size <= LARGE else ca.MX
+        self._kind = ca.SX if size <= LARGE else ca.MX
         self._slopes = {}
 
     def by_user(self):
@@ -103,10 +102,12 @@ class _Assembly:
         columns = {id(v): j for j, v in enumerate(self._variables)}
         alike = [[columns[id(v)] for v in group if id(v) in columns] for group in self._problem.hints.alike]
         alike = [group for group in alike if group]
-        s_x = variable_factors(J, (certain, constants), self._start, stated_bounds(self._variables), user.x, alike)
+        slopes = major_index(J), J.indices, J.data
+        s_x = variable_factors(slopes, (certain, constants), self._start, stated_bounds(self._variables), user.x, alike)
         points = (self._start, beside(self._start))
-        jacobians = [self._jacobian(self._rows.rows, w) @ sparse.diags(1 / s_x) for w in points]
-        return replace(user, x=s_x, g=row_factors(jacobians, user.g))
+        jacobians = (self._jacobian(self._rows.rows, w) for w in points)
+        largest = [largest_entries(with_entries(J, J.data / s_x[J.indices])) for J in jacobians]
+        return replace(user, x=s_x, g=row_factors(largest, user.g))
 
     def _linearised(self, w):
         """Jacobian of rows and sides, and the sizes of their distances from bounds where the variables are 0.
@@ -120,8 +121,8 @@ class _Assembly:
         values, terms = (np.concatenate(some)[:count] for some in zip(*parts))
         found, bounds = values - J @ w, np.concatenate([self._rows.lbg, np.zeros(sides)])
         constants = np.abs(found - np.where(np.isfinite(bounds), bounds, 0.0))
-        exact = constants > EXACT * (abs(J) @ np.abs(w) + np.abs(found))
-        return J, np.maximum(np.where(exact, constants, 0.0), np.maximum(self._rows.cancelling, terms))
+        certain = certain_constants(constants, found, abs(J) @ np.abs(w))
+        return J, np.maximum(certain, np.maximum(self._rows.cancelling, terms))
 
     def _jacobian(self, functions, w):
         """Jacobian (csr) of ``functions`` at ``w``, found once: nobody may change it."""

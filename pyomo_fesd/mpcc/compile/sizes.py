@@ -21,6 +21,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pyomo_fesd.mpcc.compile.round_off import EXACT
+
 #: Sizes of variables, and largest gradient entries of rows, that need no factor.
 MILD_SIZES, MILD_ROWS = (1e-3, 2e6), (1e-3, 1e6)
 #: Sizes beyond these are start values without a meaning.
@@ -36,12 +38,28 @@ def without_small(start: np.ndarray) -> np.ndarray:
     return np.where(np.abs(start) < MILD_SIZES[0], 0.0, start)
 
 
-def variable_factors(J, constants: Sequence, start: np.ndarray, bounds: tuple, given: np.ndarray, alike: Sequence) -> np.ndarray:
+def certain_constants(constants: np.ndarray, found: np.ndarray, terms: np.ndarray) -> np.ndarray:
+    """Return sizes of ``constants`` of linearised rows, with 0 for rounding errors.
+
+    Parameters
+    ----------
+    found : array
+        the values of the rows without their linear terms
+    terms : array
+        the sizes of these, added up
+    """
+    return np.where(constants > EXACT * (terms + np.abs(found)), constants, 0.0)
+
+
+def variable_factors(
+    slopes: tuple, constants: Sequence, start: np.ndarray, bounds: tuple, given: np.ndarray, alike: Sequence
+) -> np.ndarray:
     """Return the factors of the variables.
 
     Parameters
     ----------
-    J : csr (rows, n)
+    slopes : (int array, int array, array)
+        rows, columns and numbers of the entries of J
     constants : list of arrays (rows)
         sizes of the constants of the linearised rows; the later ones count for variables without a size by the earlier ones
     start : array (n)
@@ -60,8 +78,11 @@ def variable_factors(J, constants: Sequence, start: np.ndarray, bounds: tuple, g
     bounded = np.maximum(np.abs(bounds[0]), np.abs(bounds[1]))
     mild = (sizes == 0) & (bounded >= MILD_SIZES[0]) & (bounded <= MILD_SIZES[1])
     sizes[mild] = bounded[mild]
+    i, j, numbers = slopes
+    used = np.isfinite(numbers) & (numbers != 0)
+    entries = i[used], j[used], np.abs(numbers[used])
     for b in constants:
-        sizes = _spread(abs(J).tocsr(), b, sizes, group)
+        sizes = _spread(entries, b, sizes, group)
     sizes = np.minimum(sizes, np.where(bounded > 0, bounded, np.inf))
     sizes = np.where(sizes > 0, np.maximum(sizes, _largest_of_group(np.abs(start), group)), 0.0)
     return np.where(given != 1.0, given, _factors(sizes, MILD_SIZES))
@@ -72,7 +93,7 @@ def beside(start: np.ndarray) -> np.ndarray:
     return start * (1 + NEAR * np.random.default_rng(0).uniform(-1, 1, start.size))
 
 
-def row_factors(jacobians: Sequence, given: np.ndarray) -> np.ndarray:
+def row_factors(largest: Sequence[np.ndarray], given: np.ndarray) -> np.ndarray:
     """Return the factors of rows; one of the user (not 1) is kept.
 
     A row whose gradient is large at one of the points only is near a singularity there, such as a logarithmic mean of equal
@@ -80,11 +101,10 @@ def row_factors(jacobians: Sequence, given: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    jacobians : list of csr (rows, n)
-        in scaled variables, at points near one another; rows that have no value at a point are judged by the others
+    largest : list of arrays (rows)
+        the largest slope by scaled variables, at points near one another; rows that have none at a point are judged by the others
     given : array (rows)
     """
-    largest = [abs(J).max(axis=1).toarray().ravel() if J.shape[1] else np.zeros(J.shape[0]) for J in jacobians]
     least = np.fmin.reduce([np.where(np.isfinite(g), g, np.nan) for g in largest])
     return np.where(given != 1.0, given, _factors(least, MILD_ROWS))
 
@@ -102,14 +122,11 @@ def _largest_of_group(values, group):
     return largest[group]
 
 
-def _spread(J, b, sizes, group):
+def _spread(entries, b, sizes, group):
     """Give variables of size 0 that of the terms beside them: by rows with one of them first, as by the others it is half a guess.
 
     A state that begins at 1e-9 with a rate of 1 is not of the size 1e-9.
     """
-    rows = np.repeat(np.arange(J.shape[0]), np.diff(J.indptr))
-    used = np.isfinite(J.data) & (J.data > 0)
-    entries = rows[used], J.indices[used], J.data[used]
     b = np.where(np.isfinite(b), b, 0.0)
     for _ in range(SWEEPS):
         new = _by_rows_with_one(entries, b, sizes, group)
