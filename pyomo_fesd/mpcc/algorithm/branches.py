@@ -108,15 +108,23 @@ class Branches:
         return certificate.certified
 
     def try_neighbours(self):
-        """Solve the neighbouring branches of the incumbent, and those of each better point found, until none of them is better."""
+        """Solve the neighbouring branches of the incumbent, and those of each better point found, until none of them is better.
+
+        Changes move.  If no certified point is found so, everything else in their places moves too, whatever it means.
+        """
         self._try_without_all_short()
+        self._try_each()
+        if not self.run.point.certificate.certified:
+            self._try_each(wide=True)
+
+    def _try_each(self, wide=False):
         neighbours = deque(self._c.neighbours)
         left = len(neighbours)
         while left:
             point, neighbour = self.run.point, neighbours[0]
             neighbours.rotate(-1)
             left -= 1
-            self._try(point, neighbour)
+            self._try(point, neighbour, wide=wide)
             if self._is_progress(point, WORTH):
                 left = len(neighbours)
 
@@ -134,9 +142,9 @@ class Branches:
             if not self._is_progress(point, PROGRESS):
                 return
 
-    def _try(self, point, *neighbours):
+    def _try(self, point, *neighbours, wide=False):
         """Solve the branch of neighbours of a point, one after the other, unless it was tried, and go on from a better solution."""
-        zero = self.zero_sides(point, *neighbours)
+        zero = self.zero_sides(point, *neighbours, wide=wide)
         if zero is None or self.tried(zero):
             return
         start = point.w.copy()
@@ -183,15 +191,24 @@ class Branches:
         zero = self._subsolves.sets(point.w, self._tolerances.biactive).zero
         self.improve_from(self.solutions.certified(point.w, zero, max_iter=SECOND), True)
 
-    def zero_sides(self, point, *neighbours, always=False):
-        """The zero sides of neighbouring branches of ``point``, one after the other; None if they need not be tried."""
+    def zero_sides(self, point, *neighbours, always=False, wide=False):
+        """The zero sides of neighbouring branches of ``point``, one after the other; None if they need not be tried.
+
+        Parameters
+        ----------
+        always : bool
+            whether also where no variable is at its lower bound, although they ask for that
+        wide : bool
+            whether all moves, also where nothing changes
+        """
         if not (always or all(self._is_short(point, neighbour) for neighbour in neighbours)):
             return None
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)
         zero = sets.zero
         for neighbour in neighbours:
             now = ActiveSets(zero, sets.gamma)
-            zero = with_moves(zero, [change.moved(neighbour.later) for change in neighbour.changes if differs(change, now)])
+            changes = [change for change in neighbour.changes if wide or differs(change, now)]
+            zero = with_moves(zero, [change.moved(neighbour.later) for change in changes])
         # the point lies on both sides of a bi-active pair already
         return zero if np.any((zero != sets.zero) & ~sets.gamma) else None
 

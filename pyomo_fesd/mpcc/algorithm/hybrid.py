@@ -101,6 +101,7 @@ class HybridSolver:
                 return Outcome.NO_BRANCH if self.run.point is None else Outcome.FEASIBLE
             self._from_start()
             self._finish()
+            self._look_around()
         if self.run.point is None:
             return Outcome.INFEASIBLE
         if not self._is_certified():
@@ -124,6 +125,15 @@ class HybridSolver:
         self._c.widen()
         self._descend_at_last()
         self._settle()
+
+    def _look_around(self):
+        """Go on from another branch where orders of changes stay open at the point."""
+        before = self.run.point
+        if before is None or before.certificate.certified or not self._c.has_objective:
+            return
+        self._branches.try_neighbours()
+        if self.run.point is not before:
+            self._finish()
 
     def _descend_at_last(self):
         """Descend from a point that was not worth it on the way, as the homotopy promised better ones that it did not find."""
