@@ -11,7 +11,7 @@ import pyomo_fesd
 from pyomo_fesd.core import all_hints, moving_grids
 from pyomo_fesd.finite_elements.changes import switching_together
 from tests.models import dcs
-from tests.problems import carried, events_together, kink_at_stage, two_experiments
+from tests.problems import carried, events_together, kink_at_stage, landing_at_stage, two_experiments
 from tests.problems.running import move, transform
 
 
@@ -232,4 +232,21 @@ def test_two_equal_events_stay_certified(kind):
     events = events_together.Events(same, np.array([1.0, 1.0]), np.zeros(2), events.w)
     m = events_together.simulated(events, kind, 6)
     m.cost.set_value(m.cost.expr + (m.theta - 1) ** 2 + sum(m.x[2, i] for i in m.i) * 1e-3)
+    assert pyomo_fesd.certify(m).certified
+
+
+# A landing on the boundary of a control stage, of a body that must not slip
+
+
+@pytest.mark.parametrize('before, after', [(3, 1), (1.5, 1), (1, 1.5), (2.5, 1.9)])
+def test_a_landing_at_a_stage_is_not_certified_where_a_slope_descends(before, after):
+    landing = landing_at_stage.Landing(before, after, 2)
+    m = landing.solved(4)
+    assert min(landing.slopes) < 0 and pyo.value(m.y[1]) == pytest.approx(0, abs=1e-7)
+    assert not pyomo_fesd.certify(m).certified
+
+
+def test_a_landing_at_a_stage_is_certified_where_nothing_can_move_it():
+    m = landing_at_stage.Landing(3, 1, 2).solved(4)
+    m.theta.fix(1)
     assert pyomo_fesd.certify(m).certified

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pyomo.environ as pyo
 import pytest
-from problems import mpcc_collection, small_mpccs
+from problems import carried, mpcc_collection, small_mpccs
 from problems.parts import parts
+from problems.running import move
 from pyomo.mpec import Complementarity, complements
 
+import pyomo_fesd
 from pyomo_fesd.core import BranchConstraint, homotopy_hints
 from pyomo_fesd.mpcc.algorithm import branch_solutions, branches
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Stop
@@ -294,3 +296,27 @@ def test_from_a_branch_that_did_not_end_only_large_steps_are_worth_it(monkeypatc
         assert (p.branches.descend(unfinished, True) is not None) == found
     p.branches.forget()
     assert p.branches.descend(point, True).f == pytest.approx(0, abs=1e-6)
+
+
+# Neighbouring branches of a moving grid
+
+
+def jump_inside_a_stage():
+    """A state jump at t = 0.6, at the second of two inner boundaries of the first control stage; simulated."""
+    m = carried.build_with_jump()
+    move(m, 6, 2, piecewise_constant=[m.u])
+    for t in m.t:
+        m.u[t].value = carried.CONTROLS[t > 1]
+    pyomo_fesd.simulate(m)
+    p = parts(m)
+    p.branches.explore_from(p.compiled.x0, False)
+    return p
+
+
+def test_a_neighbouring_branch_moves_what_changes_at_its_boundary():
+    p = jump_inside_a_stage()
+    at_stage = [n for n in p.compiled.neighbours if not n.short.size]
+    assert len(at_stage) == 2
+    # the boundary of the stages lies beside that of the jump
+    assert all(p.branches.zero_sides(p.run.point, n) is None for n in at_stage)
+    assert any(p.branches.zero_sides(p.run.point, n, wide=True) is not None for n in at_stage)

@@ -89,3 +89,13 @@ def test_values_that_nothing_determines_stay_within_their_bounds(k):
     assert np.all(found[inner] >= c.lbx[inner] - 1e-9)
     assert part.missed(found) <= 1e-8
     assert part.solve(start) is None
+
+
+def test_a_part_hands_on_the_forces_of_a_contact_that_must_not_slip():
+    c = compile_mpcc(read_mpcc(in_flight()), HierarchicalTimer())
+    parts = Parts(c)
+    names = {c.variables[j].name.rsplit('.')[-1] for j in np.flatnonzero(parts.is_handed_on)}
+    assert names == {'forward', 'backward'}
+    of_first = parts.is_handed_on & (parts.of_variable == 0)
+    among = (parts.pattern @ of_first.astype(float) > 0) & (parts.pattern @ (parts.of_variable == 1).astype(float) > 0)
+    assert among.any() and set(parts.of_row[among]) == {1}
