@@ -10,8 +10,9 @@ The transformation reads the switched systems that other transformations recorde
 - ``cross_complementarity``, ``state_jumps``, ``hysteresis``, ``right_limits``, ``mode_limits``, ``relations``: the laws of
   switching
 - ``contacts``, ``impulse_balance``, ``impact_laws``, ``friction_impulses``, ``curved_contacts``: rigid contacts
-- ``equilibration``, ``sliding_exit``, ``neighbour_branches``, ``coincidences``, ``arrivals``, ``chain_of_elements``: the lengths,
-  and hints for the homotopy
+- ``equilibration``, ``sliding_exit``: the lengths
+- ``changes`` at boundaries, with ``neighbour_branches``, ``coincidences``, ``arrivals``, ``chain_of_elements``: hints for the
+  homotopy
 - ``recollocation``, ``inner_points``: more points in the elements of a model that is discretised already
 - ``given_inputs``, ``explicit_time``, ``untaken_kinks``, ``spatial_sets``, ``first_mode``: inputs, warnings and refusals
 """
