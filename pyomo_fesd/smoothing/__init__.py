@@ -6,8 +6,8 @@ transformation.py
     the transformation and its options
 sources.py, survey.py, patterns.py
     find the sources, select the absolute values to replace, recognise |z|
-rewriting.py, linear_terms.py
-    replace the patterns of one expression and collect like terms
+rewriting.py, linear_terms.py, rewritten_sources.py
+    replace the patterns of one expression and collect like terms; sources that are built alike
 generated_blocks.py, summary.py
     hold the new variables and pairs; count the changes
 
