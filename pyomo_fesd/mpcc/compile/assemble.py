@@ -37,13 +37,13 @@ SMALL = 100
 AUTO, STARTS, COEFFICIENTS, USER = NATURAL_UNITS = ('auto', 'starts', 'coefficients', 'user')
 
 
-def assemble(problem, rows, symbols, factors, natural):
+def assemble(problem, rows, symbols, factors, natural, expanded=False):
     """The ``MpccFunctions`` of ``problem`` from its ``ModelRows``; ``factors`` are the user's.
 
-    ``natural`` says by what the others are scaled, as in ``compile_mpcc``.
+    ``natural`` says by what the others are scaled, as in ``compile_mpcc``; functions are SX if ``expanded``.
     """
     by_starts = natural == STARTS or (natural == AUTO and bool(problem.hints.alike))
-    assembly = _Assembly(problem, rows, symbols, factors)
+    assembly = _Assembly(problem, rows, symbols, factors, expanded)
     scaled = assembly.by_starts() if by_starts else assembly.by_user()
     compiled = assembly.functions(scaled)
     if natural == USER:
@@ -76,7 +76,7 @@ class _Factors:
 class _Assembly:
     """The functions of one MPCC, whatever their factors."""
 
-    def __init__(self, problem, rows, symbols, factors):
+    def __init__(self, problem, rows, symbols, factors, expanded):
         self._problem, self._rows, self._factors = problem, rows, factors
         self._parameters = symbols.parameters
         self._variables, self._constraints = rows.variables, [symbols.original(c) for c in rows.constraints]
@@ -84,7 +84,7 @@ class _Assembly:
         self._start, _ = start_values(self._variables)
         self._p = parameter_values(self._parameters)
         size = sum(functions.size for functions in (rows.cost, rows.rows, rows.sides, rows.others))
-        self._kind = ca.SX if size <= LARGE else ca.MX
+        self._kind = ca.SX if expanded or size <= LARGE else ca.MX
         self._slopes = {}
 
     def by_user(self):

@@ -26,6 +26,7 @@ def compile_mpcc(
     user_scaling: bool = True,
     natural_units: str = USER,
     check=lambda: None,
+    expanded: bool = False,
     conditions: bool = False,
 ) -> MpccFunctions:
     """Compile ``problem``.
@@ -46,6 +47,8 @@ def compile_mpcc(
         linear or small), 'user' (nothing: they stay as they are, and so does the objective, which gets its unit in the other cases)
     check : callable
         called between the steps; an exception of its own ends them
+    expanded : bool
+        whether each function is to be a casadi graph of its own (SX), however large the model is: the baselines of the MPCC study
     conditions : bool
         whether ``Expr_if`` may stand in rows: kinks that nothing resolves, as in a smooth static model
 
@@ -64,4 +67,4 @@ def compile_mpcc(
             rows = model_rows(problem, symbols, conditions)
         check()
         with phase(timer, 'assemble'):
-            return assemble(problem, rows, symbols, factors, natural_units)
+            return assemble(problem, rows, symbols, factors, natural_units, expanded)
