@@ -11,7 +11,7 @@ Does not apply: to sides of a hand-written Complementarity.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 
 import numpy as np
@@ -34,11 +34,19 @@ NODES = tuple((1 - np.cos(np.pi * (np.arange(12) + 0.5) / 12)) / 2)
 INSIDE = tuple(np.linspace(0.0, 1.0, 202)[1:-1].tolist())
 
 
-def missed_crossings(model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction]) -> Iterator[str]:
-    """Yield messages for elements in which a function has the wrong sign between collocation points."""
+def missed_crossings(
+    model: Block, wrt: ContinuousSet, functions: list[SwitchingFunction], largest: dict | None = None
+) -> Iterator[str]:
+    """Yield messages for elements in which a function has the wrong sign between collocation points.
+
+    ``largest`` has the largest value of each function in elements before those on the grid, by its number, and is updated: where a
+    few elements march, all of them may lie in a slide, in which a function has values of round-off only.
+    """
     moving = moving_grids(model)[wrt]
-    after = _values_after_jumps(model, wrt)
-    for f in _kept(moving, functions):
+    after, largest = _values_after_jumps(model, wrt), {} if largest is None else largest
+    for number, function in enumerate(_kept(moving, functions)):
+        f = replace(function, before=largest.get(number, 0.0))
+        largest[number] = f.largest
         found = next(filter(None, (_crossing(f, element, moving.grid, after) for element in moving.new_elements)), None)
         if found is not None:
             (element, crossing), time = found, moving.physical_time()
@@ -66,6 +74,8 @@ class _Kept:
     sign : callable (kept, element) -> 1, -1, or 0 where the function slides or is not kept
     nu : dict label -> VarData or None
         the multiplier of a switching function
+    before : float
+        its largest value in elements before those on the grid
     """
 
     name: str
@@ -73,11 +83,17 @@ class _Kept:
     numbers: dict
     sign: Callable
     nu: dict | None = None
+    before: float = 0.0
 
     @cached_property
+    def largest(self):
+        """The largest value so far."""
+        return max(largest_value(self.numbers), self.before)
+
+    @property
     def zero(self):
         """The size below which the function is zero."""
-        return ZERO * largest_value(self.numbers)
+        return ZERO * self.largest
 
     def leaves_smoothly(self, element, grid):
         """Whether a slide ends at the left boundary of ``element`` and its multiplier arrives there."""

@@ -63,6 +63,7 @@ class MarchReview:
     def __init__(self, model: Block, wrt: ContinuousSet):
         self._model, self._wrt, self._said = model, wrt, set()
         self._functions = cache(partial(switching_functions, model, wrt))
+        self._named = CHECKS | {'missed crossings': partial(missed_crossings, largest={})}
         self._checks = AT_FIRST
 
     def look(self) -> None:
@@ -70,7 +71,7 @@ class MarchReview:
         # a function keeps the values of its first use
         functions = cache(lambda: [replace(function) for function in self._functions()])
         for name in self._checks:
-            for message in _messages(name, CHECKS[name], self._model, self._wrt, functions):
+            for message in _messages(name, self._named[name], self._model, self._wrt, functions):
                 subject = name, message.partition(':')[0]
                 if subject not in self._said:
                     self._said.add(subject)

@@ -20,3 +20,10 @@ def test_constants_that_cancel_hide_no_solution(kind, seed, method):
     system, found = draw(kind, seed)
     verdict, error, said = run(system, found, method, limit=60)
     assert verdict == RIGHT, (error, said)
+
+
+@pytest.mark.parametrize('seed', [8, 21, 91])
+def test_a_slide_in_large_units_gives_no_false_alarm_where_elements_march(seed):
+    system, found = draw('units', seed)
+    verdict, error, said = run(system, found, 'simulate, no grid', limit=60)
+    assert verdict == RIGHT, (error, said)
