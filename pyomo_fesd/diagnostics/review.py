@@ -63,7 +63,7 @@ class MarchReview:
     def __init__(self, model: Block, wrt: ContinuousSet):
         self._model, self._wrt, self._said = model, wrt, set()
         self._functions = cache(partial(switching_functions, model, wrt))
-        self._named = CHECKS | {'missed crossings': partial(missed_crossings, largest={})}
+        self._named = CHECKS | {'missed crossings': partial(CHECKS['missed crossings'], largest={})}
         self._checks = AT_FIRST
 
     def look(self) -> None:

@@ -444,7 +444,7 @@ def test_a_start_on_a_boundary_that_repels_is_said_once(caplog):
 def test_each_element_is_reviewed_once_on_physical_time(monkeypatch, caplog):
     seen_at = []
 
-    def check(model, wrt, functions):
+    def check(model, wrt, functions, largest):
         moving = moving_grids(model)[wrt]
         time = moving.physical_time()
         for element in moving.new_elements:
