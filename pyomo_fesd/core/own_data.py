@@ -14,19 +14,17 @@ from pyomo.core.base.block import BlockData
 def own_components(block: Block, ctype, descend_into, active: bool | None = None) -> Iterator:
     """Yield the components of type ``ctype`` that are no References; the parameters and the order are those of Pyomo's walks."""
     wanted, places = (set(types) if isinstance(types, tuple) else {types} for types in (ctype, descend_into))
-    # Disjuncts are many, and most have none of the types: Pyomo takes longer to make a map than to read it
-    declared, inner, met = block.component_map(wanted, active), block.component_map(places, active), wanted | places
+    read, read_inner, met = components_reader(block, wanted, active), components_reader(block, places, active), wanted | places
     waiting = [block] if active is None or block.active == active else []
     while waiting:
-        declared._block = inner._block = place = waiting.pop()
-        if not wanted.isdisjoint(place._ctypes):
-            yield from (c for c in declared.values() if not _is_reference(c))
-        if not places.isdisjoint(place._ctypes):
-            found = [b for c in inner.values() if not _is_reference(c) for b in c.values() if not met.isdisjoint(b._ctypes)]
-            waiting += [b for b in reversed(found) if active is None or b.active == active]
+        place = waiting.pop()
+        yield from (c for c in read(place) if not is_reference(c))
+        # Disjuncts are many, and most have none of the types
+        found = [b for c in read_inner(place) if not is_reference(c) for b in c.values() if not met.isdisjoint(b._ctypes)]
+        waiting += [b for b in reversed(found) if active is None or b.active == active]
 
 
-def components_reader(block: Block, ctypes: frozenset, active: bool | None = None) -> Callable:
+def components_reader(block: Block, ctypes: Collection, active: bool | None = None) -> Callable:
     """Return the function from ``block``, or one below it, to its components of some types, References among them."""
     components = block.component_map(ctypes, active)
 
@@ -44,7 +42,8 @@ def declared(block: Block, types: Collection) -> Iterable:
     return () if block._ctypes.keys().isdisjoint(types) else block.component_map(types).values()
 
 
-def _is_reference(component):
+def is_reference(component) -> bool:
+    """Return whether a component only names data of others again."""
     return component.is_indexed() and component.is_reference()
 
 
@@ -54,7 +53,7 @@ def own_blocks(block: Block, descend_into: Collection, active: bool | None = Non
     while waiting:
         place = waiting.pop()
         yield place
-        found = [b for c in declared(place, descend_into) if not _is_reference(c) for b in c.values()]
+        found = [b for c in declared(place, descend_into) if not is_reference(c) for b in c.values()]
         waiting += [b for b in reversed(found) if active is None or b.active == active]
 
 

@@ -19,7 +19,7 @@ from pyomo.mpec import Complementarity
 
 from pyomo_fesd.core.generated import is_generated
 from pyomo_fesd.core.interruption import DeferredInterrupt
-from pyomo_fesd.core.own_data import data_of, own_blocks
+from pyomo_fesd.core.own_data import data_of, is_reference, own_blocks
 from pyomo_fesd.core.private_data import remember_records
 
 PLACES = (Block, Disjunct)
@@ -94,7 +94,7 @@ def _by_type(blocks):
 
 def _data(components, ctype):
     """The data of the components of a type; a Reference only names data of others."""
-    return (data for c in components[ctype] if not (c.is_indexed() and c.is_reference()) for data in data_of(c))
+    return (data for c in components[ctype] if not is_reference(c) for data in data_of(c))
 
 
 def _remember_values(components) -> Callable[[], None]:

@@ -6,7 +6,8 @@ lies on such a boundary can be a local minimum of the discretised problem only. 
 length.  Each inner boundary has two neighbouring branches: the element after it takes over the active set of the element before it,
 or the other way round; inside a control stage only where that element has its least length.
 
-Only what changes at the boundary moves: another system keeps the sides of its pairs.
+Only what changes at the boundary moves: another system keeps the sides of its pairs.  ``mpec_hybrid`` lets everything there move
+only where no certified point is found so.
 
 Takes: the changes at the boundaries.
 Leaves: a ``NeighbourBranch`` for each of the two in the block's ``HomotopyHints``: ``mpec_hybrid`` tries these branches too.

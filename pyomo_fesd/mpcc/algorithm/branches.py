@@ -8,10 +8,10 @@ from collections import Counter, deque
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.branch_solutions import FIRST, SECOND, BranchSolutions
-from pyomo_fesd.mpcc.algorithm.moves import differs, with_moves
+from pyomo_fesd.mpcc.algorithm.neighbours import Neighbours
 from pyomo_fesd.mpcc.algorithm.search import FEW, Verdict, exhaust, leaves
 from pyomo_fesd.mpcc.algorithm.state import Point
-from pyomo_fesd.mpcc.subproblems import MATTERS, ActiveSets, Stationarity
+from pyomo_fesd.mpcc.subproblems import MATTERS, Stationarity
 
 #: A branch NLP's objective must fall by this, relative, to count as descent.
 PROGRESS = 1e-8
@@ -32,8 +32,6 @@ WIDE = {'mip_abs_gap': 1e-6, 'mip_max_nodes': 100}
 SUGGESTED = 50
 #: Trust region of the LPEC that searches for any feasible branch.
 SEARCH_RADIUS = 1e3
-#: A variable nearer to its lower bound than this is at it.
-AT_BOUND = 1e-6
 
 
 class Branches:
@@ -56,7 +54,7 @@ class Branches:
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
         self._attempts, self._solved, self._exhausted = Counter(), {}, {}
         self._first = SECOND if patient else FIRST
-        self.solutions = BranchSolutions(subsolves)
+        self.solutions, self.neighbours = BranchSolutions(subsolves), Neighbours(subsolves)
 
     # called by the algorithm
 
@@ -118,7 +116,7 @@ class Branches:
             self._try_each(wide=True)
 
     def _try_each(self, wide=False):
-        neighbours = deque(self._c.neighbours)
+        neighbours = deque(self.neighbours.all)
         left = len(neighbours)
         while left:
             point, neighbour = self.run.point, neighbours[0]
@@ -132,19 +130,14 @@ class Branches:
         """Solve the branches without any of the variables at their lower bound: one by one each would gain next to nothing."""
         while True:
             point = self.run.point
-            short = [neighbour for neighbour in self._c.neighbours if neighbour.short.size and self._is_short(point, neighbour)]
-            # a place of least extent takes over what one of the two beside it holds
-            by_first = {neighbour.short.tobytes(): neighbour for neighbour in reversed(short)}
-            by_last = {neighbour.short.tobytes(): neighbour for neighbour in short}
-            if len(by_last) > 1:
-                for some in (reversed(by_first.values()), reversed(by_last.values())):
-                    self._try(point, *some)
+            for some in self.neighbours.without_all_short(point):
+                self._try(point, *some)
             if not self._is_progress(point, PROGRESS):
                 return
 
     def _try(self, point, *neighbours, wide=False):
         """Solve the branch of neighbours of a point, one after the other, unless it was tried, and go on from a better solution."""
-        zero = self.zero_sides(point, *neighbours, wide=wide)
+        zero = self.neighbours.zero_sides(point, *neighbours, wide=wide)
         if zero is None or self.tried(zero):
             return
         start = point.w.copy()
@@ -162,7 +155,7 @@ class Branches:
         What a place of least extent holds is as small as the tolerances: the LPEC does not see that only the bound keeps it.
         """
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
-        for zero in self._beside_short(point):
+        for zero in self.neighbours.beside_short(point):
             found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f, enough=enough)
             if found is not None:
                 return found
@@ -170,11 +163,7 @@ class Branches:
 
     def has_short(self, point) -> bool:
         """Whether a variable of ``point`` is at its lower bound, so that there are branches for ``without_short``."""
-        return next(self._beside_short(point), None) is not None
-
-    def _beside_short(self, point):
-        sides = (self.zero_sides(point, neighbour) for neighbour in self._c.neighbours if neighbour.short.size)
-        return (zero for zero in sides if zero is not None)
+        return next(self.neighbours.beside_short(point), None) is not None
 
     def _widen_from(self, end):
         """Go on without guide bounds from a point below the incumbent that only these keep from descending."""
@@ -190,32 +179,6 @@ class Branches:
     def _release(self, point):
         zero = self._subsolves.sets(point.w, self._tolerances.biactive).zero
         self.improve_from(self.solutions.certified(point.w, zero, max_iter=SECOND), True)
-
-    def zero_sides(self, point, *neighbours, always=False, wide=False):
-        """The zero sides of neighbouring branches of ``point``, one after the other; None if they need not be tried.
-
-        Parameters
-        ----------
-        always : bool
-            whether also where no variable is at its lower bound, although they ask for that
-        wide : bool
-            whether all moves, also where nothing changes
-        """
-        if not (always or all(self._is_short(point, neighbour) for neighbour in neighbours)):
-            return None
-        sets = self._subsolves.sets(point.w, self._tolerances.biactive)
-        zero = sets.zero
-        for neighbour in neighbours:
-            now = ActiveSets(zero, sets.gamma)
-            changes = [change for change in neighbour.changes if wide or differs(change, now)]
-            zero = with_moves(zero, [change.moved(neighbour.later) for change in changes])
-        # the point lies on both sides of a bi-active pair already
-        return zero if np.any((zero != sets.zero) & ~sets.gamma) else None
-
-    def _is_short(self, point, neighbour):
-        """Whether a neighbouring branch is one of this point: a variable is at its lower bound, if it asks for that."""
-        short = neighbour.short
-        return not short.size or bool(np.any(point.w[short] <= self._c.lbx[short] + AT_BOUND))
 
     def search(self, *starts):
         """Search for any feasible branch: by the LPEC with every pair as a binary, then depth first over the pairs."""

@@ -11,7 +11,8 @@ Leaves: a certified one that is more even, or better.
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND
-from pyomo_fesd.mpcc.algorithm.branches import AT_BOUND, PROGRESS, is_below
+from pyomo_fesd.mpcc.algorithm.branches import PROGRESS, is_below
+from pyomo_fesd.mpcc.algorithm.neighbours import AT_BOUND
 
 #: A point is more even than another if its deviations are smaller by this part.
 EVENER = 1e-3
@@ -69,7 +70,7 @@ class Evenness:
         candidates = [n for n in self._c.neighbours if n.short.size]
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
         for neighbour in sorted(candidates, key=lambda n: point.w[n.short].max()):
-            zero = self._branches.zero_sides(point, neighbour, always=True)
+            zero = self._branches.neighbours.zero_sides(point, neighbour, always=True)
             if zero is None or zero.tobytes() in tried:
                 continue
             if self.run.counts.iterations >= most:

@@ -101,7 +101,7 @@ class HybridSolver:
                 return Outcome.NO_BRANCH if self.run.point is None else Outcome.FEASIBLE
             self._from_start()
             self._finish()
-            self._look_around()
+            self._try_neighbours_at_last()
         if self.run.point is None:
             return Outcome.INFEASIBLE
         if not self._is_certified():
@@ -126,8 +126,8 @@ class HybridSolver:
         self._descend_at_last()
         self._settle()
 
-    def _look_around(self):
-        """Go on from another branch where orders of changes stay open at the point."""
+    def _try_neighbours_at_last(self):
+        """Go on from a neighbouring branch where the point is not certified in the end."""
         before = self.run.point
         if before is None or before.certificate.certified or not self._c.has_objective:
             return

@@ -318,5 +318,5 @@ def test_a_neighbouring_branch_moves_what_changes_at_its_boundary():
     at_stage = [n for n in p.compiled.neighbours if not n.short.size]
     assert len(at_stage) == 2
     # the boundary of the stages lies beside that of the jump
-    assert all(p.branches.zero_sides(p.run.point, n) is None for n in at_stage)
-    assert any(p.branches.zero_sides(p.run.point, n, wide=True) is not None for n in at_stage)
+    assert all(p.branches.neighbours.zero_sides(p.run.point, n) is None for n in at_stage)
+    assert any(p.branches.neighbours.zero_sides(p.run.point, n, wide=True) is not None for n in at_stage)
