@@ -14,6 +14,8 @@ Leaves: the same equations.
 Does not apply: to models that were discretised before.
 """
 
+from functools import cache
+
 import numpy as np
 from pyomo.dae import ContinuousSet, DerivativeVar
 from pyomo.dae.misc import generate_finite_elements
@@ -21,6 +23,19 @@ from pyomo.dae.plugins.colloc import Collocation_Discretization_Transformation
 from scipy.special import roots_jacobi, roots_legendre
 
 from pyomo_fesd.core import stored_index
+
+
+@cache
+def radau_points(ncp: int) -> tuple[float, ...]:
+    """Return 0 and the Radau points of [0, 1]."""
+    roots = roots_jacobi(ncp - 1, 1, 0)[0] if ncp > 1 else np.array([])
+    return 0.0, *((roots + 1) / 2).tolist(), 1.0
+
+
+@cache
+def legendre_points(ncp: int) -> tuple[float, ...]:
+    """Return 0 and the Gauss-Legendre points of [0, 1]."""
+    return 0.0, *((roots_legendre(ncp)[0] + 1) / 2).tolist()
 
 
 class Collocation(Collocation_Discretization_Transformation):
@@ -31,12 +46,10 @@ class Collocation(Collocation_Discretization_Transformation):
         self._decimals = decimals
 
     def _get_radau_constants(self, currentds):
-        inner = self._ncp[currentds] - 1
-        roots = roots_jacobi(inner, 1, 0)[0] if inner else np.array([])
-        self._set(currentds, [0.0, *(roots + 1) / 2, 1.0])
+        self._set(currentds, radau_points(self._ncp[currentds]))
 
     def _get_legendre_constants(self, currentds):
-        tau = [0.0, *(roots_legendre(self._ncp[currentds])[0] + 1) / 2]
+        tau = legendre_points(self._ncp[currentds])
         self._set(currentds, tau)
         shares = _barycentric_weights(tau) / (1 - np.array(tau))
         self._afinal[currentds] = (shares / shares.sum()).tolist()
@@ -79,7 +92,7 @@ class Collocation(Collocation_Discretization_Transformation):
 
     def _set(self, wrt, tau):
         rates = derivatives(tau)
-        self._tau[wrt], self._afinal[wrt] = [float(t) for t in tau], None
+        self._tau[wrt], self._afinal[wrt] = list(tau), None
         # row i: polynomial i
         self._adot[wrt], self._adotdot[wrt] = rates.T.tolist(), (rates @ rates).T.tolist()
 

@@ -10,8 +10,12 @@ Does not apply: where a touchable pattern belongs to no row, or to two.
 """
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
+
+#: So many sign matrices are remembered: a Disjunction has one, which is read before and after its discretisation.
+MOST_MATRICES = 256
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,11 @@ class SignImplicants:
 
 def sign_implicants(signs, touchable):
     """Return the rows of a sign matrix with signs left out; None if they do not cover every touchable pattern exactly once."""
+    return _implicants(tuple(signs), tuple(touchable))
+
+
+@lru_cache(MOST_MATRICES)
+def _implicants(signs, touchable):
     rows = _fewest_signs(signs, touchable)
     if (_owners(rows, touchable) != 1).any():
         return None
