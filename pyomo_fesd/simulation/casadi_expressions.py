@@ -20,6 +20,11 @@ def _binary(code):
     return lambda node, args: ca.SX.binary(code, *args)
 
 
+def difference(a: ca.SX, b: ca.SX) -> ca.SX:
+    """Return a - b."""
+    return ca.SX.binary(ca.OP_SUB, a, b)
+
+
 def _sum(node, args):
     return reduce(partial(ca.SX.binary, ca.OP_ADD), args)
 

@@ -1,6 +1,6 @@
-"""The rows of one element class, and both sides of its conditions, as casadi expressions in the solver's scale.
+"""The rows of one element class, and both sides of its conditions, as casadi expressions with their derivatives and factors.
 
-    f(x, p) = distance of a row from its bound, or a side;    w = s_x x unknowns,   p known values
+    V(x, p) = distances of rows from their bounds, then sides;    w = s_x x unknowns,   p known values
 
 Factors follow the rules of ``mpcc.compile``: those of the user, else by sizes at the start.
 
@@ -13,13 +13,13 @@ import casadi as ca
 import numpy as np
 from pyomo.core.expr import EqualityExpression
 
-from pyomo_fesd.simulation.casadi_expressions import CasadiExpressions
+from pyomo_fesd.simulation.casadi_expressions import CasadiExpressions, difference
 from pyomo_fesd.simulation.element_equations import ElementEquations
 from pyomo_fesd.simulation.element_scale import element_scale
 
 
 class ElementFunctions:
-    """Expressions of the element class of ``pattern``.
+    """Expressions of the element class of ``pattern``, in the units of the model.
 
     Attributes
     ----------
@@ -27,13 +27,19 @@ class ElementFunctions:
         symbols of the unknowns that the equations contain, and of all known values
     order : int array
         positions of x among the unknowns of the equations
-    equations, others : list of SX
-        residuals of equations; distances of other rows from their bounds, which are not negative at a solution
-    events : list of SX
+    V, slopes : SX
+        distances and sides, and their derivatives by x
+    factors : array
+        of the entries of V in the solver's scale
+    depends : bool array
+        whether an entry of V depends on x
+    equations, others : list of int
+        entries that are residuals of equations; distances of other rows from their bounds, which are not negative at a solution
+    events : list of int
         the event functions that have unknowns at all labels, one after the other
-    points : dict name -> (list of SX, list of SX)
+    points : dict name -> (list of int, list of int)
         sides G and sides H of each condition over time that has labels
-    cross : list of (SX, SX)
+    cross : list of (int, int)
         both sides of the aggregated pairs
     s_x, lower, upper : arrays
         factors and scaled bounds of x
@@ -47,13 +53,18 @@ class ElementFunctions:
         self.x = every[self.order.tolist()]
         bounds = [pattern.bounds[k] for k in self.order.tolist()]
         lower, upper = (np.array([end if b[i] is None else b[i] for b in bounds]) for i, end in enumerate((-np.inf, np.inf)))
-        scale = element_scale(pattern, rows, self.x, self.p, self.order, (lower, upper), user_scaling)
+        self.V = ca.vertcat(ca.SX(0, 1), *rows.distances, *rows.sides)
+        slopes = ca.jacobian(self.V, ca.vertcat(self.x, self.p))
+        scale = element_scale(pattern, rows, self, slopes, (lower, upper), user_scaling)
         self.s_x, self.lower, self.upper = scale.x, lower * scale.x, upper * scale.x
-        distances, sides = _scaled(scale.rows, rows.distances), _scaled(scale.sides, rows.sides)
-        self.equations, self.others = ([distances[k] for k in numbers] for numbers in (rows.equations, rows.others))
-        self.events = [distances[k] for k in rows.events]
-        self.points = {name: tuple([sides[k] for k in some] for some in both) for name, both in rows.points.items()}
-        self.cross = [tuple(sides[k] for k in both) for both in rows.cross]
+        self.slopes, self.factors = slopes[:, : self.x.numel()], np.concatenate([scale.rows, scale.sides])
+        self.depends = np.zeros(self.V.numel(), dtype=bool)
+        self.depends[self.slopes.sparsity().row()] = True
+        self.equations, self.others, self.events = rows.equations, rows.others, rows.events
+        # sides come after the distances
+        begin = len(rows.distances)
+        self.points = {name: tuple([begin + k for k in some] for some in both) for name, both in rows.points.items()}
+        self.cross = [tuple(begin + k for k in both) for both in rows.cross]
 
 
 class ElementRows:
@@ -92,7 +103,7 @@ class ElementRows:
         unknown = [v for k, v in met.items() if k in self._unknown]
         begin = len(self.distances)
         for low, high in zip(parts, parts[1:]) if unknown else ():
-            self.distances.append(high - low)
+            self.distances.append(difference(high, low))
             self.unknown.append(unknown)
         return range(begin, len(self.distances))
 
@@ -100,8 +111,3 @@ class ElementRows:
         self.sides.append(self._writer.of(side, self.met))
         self.written.append(side)
         return len(self.sides) - 1
-
-
-def _scaled(factors, expressions):
-    """The ``expressions`` times their factors."""
-    return [e if factor == 1.0 else ca.SX(factor) * e for factor, e in zip(factors.tolist(), expressions)]

@@ -20,13 +20,24 @@ from pyomo_fesd.simulation.element_functions import ElementFunctions
 
 
 class _Stack(list):
-    """Entries of V, one below the other."""
+    """Entries of V, one below the other: ``(numbers, weights)`` of the expressions of which each is the sum."""
 
-    def push(self, entries: Iterable) -> np.ndarray:
-        """Append ``entries``; returns their rows."""
+    def push(self, numbers: Iterable[int]) -> np.ndarray:
+        """Append the expressions with these ``numbers``; returns their rows."""
+        return self.push_sums(([k] for k in numbers), [1.0])
+
+    def push_sums(self, numbers: Iterable[Sequence[int]], weights: Sequence[float]) -> np.ndarray:
+        """Append sums of expressions with ``weights``; returns their rows."""
         begin = len(self)
-        self.extend(entries)
+        self.extend((some, weights) for some in numbers)
         return np.arange(begin, len(self))
+
+    def matrix(self, factors: np.ndarray) -> ca.DM:
+        """The matrix that makes V of all expressions, which have these ``factors``."""
+        rows = [row for row, (numbers, _) in enumerate(self) for _ in numbers]
+        columns = [k for numbers, _ in self for k in numbers]
+        entries = [weight * factors[k] for numbers, weights in self for k, weight in zip(numbers, weights)]
+        return ca.DM.triplet(rows, columns, ca.DM(entries), len(self), factors.size)
 
 
 class ElementResiduals:
@@ -92,18 +103,18 @@ class ElementResiduals:
         self.repeated = ~self.continuous & (tau[-1] != 1)
         self.starts, self.ends = np.full(len(self.functions), -1), self.functions[:, -1].copy()
         self.starts[list(starts)] = stack.push(starts.values())
-        at_one = ca.DM(interpolation_weights(tau, np.ones(len(tau))))
-        rows = [ca.vertcat(*(stack[i] for i in row)) for row in self.functions[self.repeated, :-1]]
-        self.ends[self.repeated] = stack.push(ca.dot(at_one, row) for row in rows)
+        at_one = interpolation_weights(tau, np.ones(len(tau))).ravel().tolist()
+        rows = ([stack[i][0][0] for i in row] for row in self.functions[self.repeated, :-1])
+        self.ends[self.repeated] = stack.push_sums(rows, at_one)
         differentiated = len(stack)
         # the signs of all that follow are checked only
         self.others = stack.push(functions.others)
         self.cross = stack.push(pair[side] for side in (0, 1) for pair in functions.cross).reshape(2, -1)
-        self._compile(functions, ca.vertcat(*stack) if stack else ca.SX(0, 1), differentiated)
+        self._compile(functions, stack.matrix(functions.factors), differentiated)
 
-    def _compile(self, functions, V, differentiated):
+    def _compile(self, functions, matrix, differentiated):
         x, p = functions.x, functions.p
-        J = ca.jacobian(V[:differentiated], x)
+        V, J = ca.mtimes(matrix, functions.V), ca.mtimes(matrix[:differentiated, :], functions.slopes)
         function = ca.Function('element', [x, p], [ca.densify(V), J])
         self.rows = np.array(J.sparsity().row(), dtype=int)
         self.columns = np.repeat(np.arange(x.numel()), np.diff(J.sparsity().colind()))
@@ -152,6 +163,6 @@ def _sides(functions, labels):
     sides, starts = [], {}
     for both in functions.points.values():
         for S in both:
-            starts |= {len(sides) // labels: side for side in S[labels:] if ca.depends_on(side, functions.x)}
+            starts |= {len(sides) // labels: side for side in S[labels:] if functions.depends[side]}
             sides += S[:labels]
     return sides, starts

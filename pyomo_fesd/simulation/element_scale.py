@@ -31,21 +31,23 @@ class ElementScale:
     sides: np.ndarray
 
 
-def element_scale(pattern: ElementEquations, rows, x, p, order, bounds, user_scaling: bool) -> ElementScale:
+def element_scale(pattern: ElementEquations, rows, functions, slopes, bounds, user_scaling: bool) -> ElementScale:
     """Return the factors of the ``ElementRows`` of ``pattern``.
 
     Parameters
     ----------
-    x, p : SX
-        unknowns, of the positions ``order`` among those of ``pattern``, and known values
+    functions : ElementFunctions
+        with the expressions V of x and p
+    slopes : SX
+        derivatives of V by x and p
     bounds : (array, array)
         of x
     user_scaling : bool
         whether the user's factors count
     """
-    variables, m = [pattern.unknown[k] for k in order.tolist()], len(rows.distances)
+    variables, m = [pattern.unknown[k] for k in functions.order.tolist()], len(rows.distances)
     start = np.array([start_value(v.value) or 0.0 for v in variables])
-    slopes = _Slopes(pattern, rows, x, p)
+    slopes = _Slopes(pattern, m, functions, slopes)
     s_x = slopes.factors(start, bounds, _of_unknowns(pattern, variables, user_scaling))
     here, near = (slopes.largest(w, s_x) for w in (start, beside(start)))
     s_rows = row_factors([here[:m], near[:m]], _of_rows(pattern, rows.unknown, user_scaling))
@@ -55,13 +57,12 @@ def element_scale(pattern: ElementEquations, rows, x, p, order, bounds, user_sca
 class _Slopes:
     """Values and slopes of all rows and sides; scipy's matrices take longer to make than small ones to use."""
 
-    def __init__(self, pattern, rows, x, p):
-        self._m, self._count, n = len(rows.distances), len(rows.distances) + len(rows.sides), x.numel()
+    def __init__(self, pattern, m, functions, slopes):
+        self._m, self._count, n = m, functions.V.numel(), functions.x.numel()
         known = known_values(pattern)
         known = np.array([pattern.typical.get(v, now) for v, now in zip(pattern.known, known)], dtype=float)
-        V = ca.vertcat(ca.SX(0, 1), *rows.distances, *rows.sides)
-        slopes = ca.jacobian(V, ca.vertcat(x, p))
-        self._function = ca.Function('slopes', [x, p], [ca.densify(V), ca.densify(slopes.nz[:])])
+        inputs = functions.x, functions.p
+        self._function = ca.Function('slopes', inputs, [ca.densify(functions.V), ca.densify(slopes.nz[:])])
         i, j = (np.array(part, dtype=int) for part in slopes.sparsity().get_triplet())
         self._of_unknown, self._known = j < n, known
         self._i, self._j = i[self._of_unknown], j[self._of_unknown]
