@@ -23,4 +23,4 @@ from pyomo_fesd.finite_elements.first_mode import refuse_first_mode, refuse_firs
 from pyomo_fesd.finite_elements.hysteresis import LEFT, RIGHT
 from pyomo_fesd.finite_elements.lengths import LEAST
 from pyomo_fesd.finite_elements.recollocation import recollocate
-from pyomo_fesd.finite_elements.transformation import FiniteElements
+from pyomo_fesd.finite_elements.transformation import FiniteElements, lay_elements

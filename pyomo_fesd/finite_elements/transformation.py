@@ -1,5 +1,6 @@
 """``fesd.finite_elements``: collocation on elements whose boundaries find the switches."""
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from pyomo.common.collections import ComponentSet
@@ -121,23 +122,10 @@ class FiniteElements(Transformation):
 
     def _apply_to(self, instance, **kwds):
         RENAMED.refuse(kwds)
-        config = read_keywords(self.CONFIG, kwds, 'fesd.finite_elements')
-        wrt = find_continuous_set(instance, config.wrt, 'fesd.finite_elements')
-        instance = _common_block(instance, wrt)
-        _check_keywords(instance, wrt, config)
-        with TRANSFORMATION, restored_on_error(instance, wrt), PauseGC():
-            present = discretised(wrt)
-            moving = _add_grid(instance, wrt, config)
-            integrals = _rebuild_integrals(instance, moving)
-            switching = _read_switching(instance, wrt, config)
-            if present and switching:
-                warn_of_order_one(moving)
-            _warn(expressions_over_time(instance, moving, integrals, switching.laws()), moving)
-            continuity = _read_continuity(instance, moving, switching, config)
-            complementarities = _read_complementarities(moving, switching, continuity)
-            hold_controls(moving, config.piecewise_constant)
-            multiply_derivatives(moving)
-            _add_switching(moving, switching, complementarities, continuity, config)
+        with _laid(instance, read_keywords(self.CONFIG, kwds, 'fesd.finite_elements')) as (moving, switching, config):
+            if switching:
+                _relate_lengths(moving, config)
+                _describe_boundaries(moving)
             _relate_variables(moving, switching)
 
     def get_src_complementarity(self, pair):
@@ -147,6 +135,36 @@ class FiniteElements(Transformation):
     def get_element_lengths(self, wrt):
         """Return the length multipliers r_n = h_n/hbar_n (an IndexedVar over 1..N) of a moving grid, both lengths in labels."""
         return moving_grids(wrt)[wrt].r
+
+
+def lay_elements(instance: Block, **options) -> None:
+    """Lay elements to be solved one by one: ``fesd.finite_elements`` without all that relates elements to one another."""
+    with _laid(instance, FiniteElements.CONFIG(options)):
+        pass
+
+
+@contextmanager
+def _laid(instance, config):
+    """Lay the elements with their equations and conditions; ``(moving, switching, config)``, to which the body adds relations."""
+    wrt = find_continuous_set(instance, config.wrt, 'fesd.finite_elements')
+    instance = _common_block(instance, wrt)
+    _check_keywords(instance, wrt, config)
+    with TRANSFORMATION, restored_on_error(instance, wrt), PauseGC():
+        present = discretised(wrt)
+        moving = _add_grid(instance, wrt, config)
+        integrals = _rebuild_integrals(instance, moving)
+        switching = _read_switching(instance, wrt, config)
+        if present and switching:
+            warn_of_order_one(moving)
+        _warn(expressions_over_time(instance, moving, integrals, switching.laws()), moving)
+        continuity = _read_continuity(instance, moving, switching, config)
+        complementarities = _read_complementarities(moving, switching, continuity)
+        hold_controls(moving, config.piecewise_constant)
+        multiply_derivatives(moving)
+        _add_switching(moving, switching, complementarities, continuity, config)
+        if not switching:
+            moving.r.fix(1)
+        yield moving, switching, config
 
 
 def _common_block(block, wrt):
@@ -265,7 +283,7 @@ def _read_complementarities(moving, switching, continuity):
 
 
 def _add_switching(moving, switching, complementarities, continuity, config):
-    """Write the pairs of all that switches, and the conditions on the lengths."""
+    """Write the pairs of all that switches."""
     add_state_jumps(moving, switching.jumps, switching.contacts)
     limits = RightLimits(moving, continuity, [*_held(config, moving.wrt), *config.continuous])
     complementarities = list(map(limits.with_starts, complementarities))
@@ -275,12 +293,17 @@ def _add_switching(moving, switching, complementarities, continuity, config):
     add_friction_impulses(moving, complementarities)
     complementarities = without_left_slip(moving, with_departures(moving, complementarities))
     add_cross_complementarity(moving, complementarities, config.cross_complementarity)
-    if not switching:
-        moving.r.fix(1)
-        return
+
+
+def _relate_lengths(moving, config):
+    """Write the conditions on the lengths."""
     add_equilibration(moving, config.equilibration, config.rho)
     if config.equilibration == 'two_stage':
         add_sliding_exits(moving)
+
+
+def _describe_boundaries(moving):
+    """Tell the solver what may change at the boundaries."""
     changes = changes_at_boundaries(moving)
     add_neighbour_branches(moving, changes)
     add_coincidences(moving, changes)

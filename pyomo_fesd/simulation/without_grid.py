@@ -32,7 +32,7 @@ from pyomo_fesd.core import (
     withheld_messages,
 )
 from pyomo_fesd.dcs import continues_everywhere
-from pyomo_fesd.finite_elements import FiniteElements
+from pyomo_fesd.finite_elements import FiniteElements, lay_elements
 from pyomo_fesd.results import SWITCHES, switches
 from pyomo_fesd.simulation.inputs import hold_first_values
 from pyomo_fesd.simulation.marching_elements import ElementsDiffer, TimeInElements
@@ -138,26 +138,28 @@ class WithoutGrid:
 
     def _lay_two(self):
         """Lay two elements, with the ends of the only interval."""
-        self._lay(nfe=2, equilibration='none')
+        self._lay(nfe=2)
 
     def _lay_few(self):
         """Lay ``PLACES`` elements in each interval, and one for the rest of it."""
         ends = zip(self._points, self._points[1:], self._numbers)
         here = [a + min(PLACES / number, PART) * (b - a) for a, b, number in ends]
         inner = [*self._config.fixed_points, *here]
-        self._lay(nfe=[PLACES, 1] * len(here), fixed_points=inner, equilibration='none')
+        self._lay(nfe=[PLACES, 1] * len(here), fixed_points=inner)
 
     def _start(self):
         """Let variables at the times that the elements have added begin with the values of the first time."""
         families = TimeIndex(self._wrt).families_in(own_components(self._model.model(), Var, (Block, Disjunct)))
         hold_first_values(families.values(), self._wrt.first(), ComponentSet(v for u in self._held for v in u.values()))
 
-    def _lay(self, **changes):
+    def _lay(self, **places):
+        """Lay the whole grid, or the ``places`` of elements that march: options of ``fesd.finite_elements``."""
         with phase(self._timer, 'transform'):
             if not continues_everywhere(self._model, self._wrt):
                 TransformationFactory('fesd.dcs').apply_to(self._model, wrt=self._wrt)
-            given = {name: self._config[name] for name in OPTIONS} | {'piecewise_constant': self._held} | changes
-            TransformationFactory('fesd.finite_elements').apply_to(self._model, wrt=self._wrt, **given)
+            given = {name: self._config[name] for name in OPTIONS} | {'piecewise_constant': self._held, 'wrt': self._wrt} | places
+            lay = lay_elements if places else TransformationFactory('fesd.finite_elements').apply_to
+            lay(self._model, **given)
 
 
 class _Values:
