@@ -21,11 +21,12 @@ from pyomo_fesd.core.evaluation import (
     known_sign,
     mutable_parameters,
     number_of,
+    numbers_of,
     value_or_nan,
     value_or_zero,
     variables_that_count,
 )
-from pyomo_fesd.core.expression_key import component_key, exchanged, expression_key, prefix_tokens
+from pyomo_fesd.core.expression_key import component_key, exchanged, expression_key
 from pyomo_fesd.core.generated import GENERATED, is_generated, public_name, source_name
 from pyomo_fesd.core.gradient import gradient
 from pyomo_fesd.core.gradients import gradients

@@ -1,9 +1,10 @@
 """Evaluate expressions that may be undefined, and read their signs and mutable Params."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from math import isfinite, nan
 
+import numpy as np
 from pyomo.common.errors import InfeasibleConstraintException, IntervalException
 from pyomo.common.numeric_types import native_numeric_types
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
@@ -52,6 +53,31 @@ def _number(expr):
         return None
     except RecursionError:
         return value(expr, exception=False)
+
+
+def numbers_of(expr, values: Mapping) -> np.ndarray | float | None:
+    """Return the values of an expression at several points; None where a function is undefined at one, or takes numbers only.
+
+    Parameters
+    ----------
+    values : mapping id of a variable -> array
+    """
+    try:
+        with np.errstate(all='raise', under='ignore'):
+            return _numbers(expr, values)
+    except (ArithmeticError, TypeError, ValueError, RecursionError):
+        return None
+
+
+def _numbers(expr, values):
+    kind = expr.__class__
+    if kind in EVALUATED:
+        return expr._apply_operation([_numbers(arg, values) for arg in expr.args])
+    if kind in native_numeric_types:
+        return expr
+    if expr.is_expression_type():
+        raise TypeError(expr)
+    return values[id(expr)] if id(expr) in values else value(expr)
 
 
 def value_or_nan(expr) -> float:

@@ -229,7 +229,9 @@ class SwitchedSystems(AutoSlots.Mixin):
         """Add the entries of another record; returns this one."""
         for name in self.__slots__:
             mine, theirs = getattr(self, name), getattr(other, name)
-            mine.extend(theirs) if isinstance(mine, list) else mine.update(theirs)
+            # most records have entries of one kind
+            if theirs:
+                mine.extend(theirs) if isinstance(mine, list) else mine.update(theirs)
         return self
 
     def forget(self, gone: ComponentSet) -> None:

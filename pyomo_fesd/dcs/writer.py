@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import ExitStack
 
+from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentSet
 from pyomo.common.gc_manager import PauseGC
 from pyomo.core import Block
@@ -10,12 +11,13 @@ from pyomo.core.base.block import BlockData
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunction
 
-from pyomo_fesd.core import FesdError, TimeIndex, TimeWriter, switched_systems
+from pyomo_fesd.core import FesdError, TimeIndex, TimeWriter, discretised, switched_systems
 from pyomo_fesd.dcs.blending import blend, dcs_block
 from pyomo_fesd.dcs.exclusion_pairs import write_exclusions
 from pyomo_fesd.dcs.forms import heaviside, hysteresis, stewart
 from pyomo_fesd.dcs.piecewise import PiecewiseRewriter
 from pyomo_fesd.dcs.reading import (
+    Analyses,
     Nesting,
     SystemReader,
     modes_left,
@@ -44,11 +46,14 @@ class DcsWriter(TimeWriter):
         variables that modes define
     """
 
-    __slots__ = ('targets', 'form', 'hysteresis', 'defines')
+    __slots__ = ('targets', 'form', 'hysteresis', 'defines', '_analyses')
+    # those of one model do not apply to its clone
+    __autoslot_mappers__ = {'_analyses': AutoSlots.encode_as_none}
 
     def __init__(self, block, wrt, targets, form, hysteresis, defines):
         super().__init__(_one_block(block), wrt)
         self.targets, self.form, self.hysteresis, self.defines = targets or [block], form, hysteresis, defines
+        self._analyses = None
 
     def write(self) -> None:
         """Write every Disjunction and piecewise function that is active at some time, and deactivate it."""
@@ -57,7 +62,9 @@ class DcsWriter(TimeWriter):
         nesting = Nesting(model, times, with_hysteresis)
         refuse_lists_of_times(_disjunctions(model, self.targets), times)
         found = nesting.outermost(_disjunctions(model, self.targets), self.targets)
-        reader = SystemReader(TimeVariables(model, self.wrt, self.defines), times)
+        # where time is not discretised yet, the same Disjunctions follow at further times
+        analyses, self._analyses = self._analyses or Analyses(), None
+        reader = SystemReader(TimeVariables(model, self.wrt, self.defines), times, analyses)
         with PauseGC(), ExitStack() as undo:
             PiecewiseRewriter(self.block, times, undo).replace_all([*_blocks(self.targets), *self._disjuncts(found)])
             trees = [nesting.tree(d) for d in found]
@@ -71,6 +78,7 @@ class DcsWriter(TimeWriter):
             weights = {system.tree: blend(system, form, defined) for system, form in zip(systems, forms)}
             for proposition in propositions:
                 write_exclusions(dcs_block(proposition.constraint.parent_block()), proposition, exclusions, weights)
+        self._analyses = None if discretised(self.wrt) else analyses
 
     def _disjuncts(self, disjunctions):
         """The active disjuncts, where Disjunctions are among the targets: no block of the targets need contain them."""

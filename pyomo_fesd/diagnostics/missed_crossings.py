@@ -20,7 +20,7 @@ from pyomo.core import Block, value
 from pyomo.dae import ContinuousSet
 from scipy.interpolate import BarycentricInterpolator
 
-from pyomo_fesd.core import interpolation_weights, kept_values, moving_grids, number_of, variables_of
+from pyomo_fesd.core import interpolation_weights, kept_values, moving_grids, number_of, numbers_of, variables_of
 from pyomo_fesd.results import SwitchingFunction, jumps_that_happen, largest_value
 
 #: A function below this part of its largest value is zero all along an element.
@@ -170,12 +170,19 @@ def _interpolated_between_points(functions, tau, after):
     rows = [list(variables_of([f])) for f in functions]
     points = [[after.get(v, v.value) for v in rows[0]], *([v.value for v in row] for row in rows[1:])]
     columns = np.array(list(zip(*points)), dtype=float).reshape(-1, len(tau))
+    at_nodes = columns @ _interpolation(tau, NODES).T
+    found = numbers_of(functions[-1], dict(zip(map(id, rows[-1]), at_nodes)))
+    return _one_by_one(functions[-1], rows[-1], at_nodes) if found is None else np.broadcast_to(found, len(NODES))
+
+
+def _one_by_one(function, variables, values):
+    """A function at the values (columns) of its variables (rows)."""
     found = []
-    with kept_values(rows[-1]):
-        for at_node in (_interpolation(tau, NODES) @ columns.T).tolist():
-            for v, number in zip(rows[-1], at_node):
+    with kept_values(variables):
+        for numbers in values.T.tolist():
+            for v, number in zip(variables, numbers):
                 v.set_value(number, skip_validation=True)
-            found.append(number_of(functions[-1]))
+            found.append(number_of(function))
     return np.array(found)
 
 

@@ -7,6 +7,7 @@ from functools import partial
 from math import isfinite
 from operator import itemgetter
 
+from pyomo.common.numeric_types import native_types
 from pyomo.core import Block, Constraint, value
 from pyomo.core.expr.relational_expr import RelationalExpression
 from pyomo.core.expr.visitor import identify_variables
@@ -17,7 +18,6 @@ from pyomo_fesd.core import (
     TimeIndex,
     is_discretisation_equation,
     kept_values,
-    prefix_tokens,
     read_side,
     strip_time,
 )
@@ -31,6 +31,8 @@ COMPARED = 12
 TRIALS = ((0.7, 0.11), (0.0, 0.0), (7.3, -0.19), (-3.1, 0.23))
 #: Relative difference of numbers that are equal.
 SAME = 1e-9
+#: Types of numbers that are compared.
+NUMBERS = {int, float}
 
 
 def warn_explicit_time(moving: MovingGrid, expressions: Iterable[tuple]) -> None:
@@ -111,20 +113,23 @@ def _unequal(a, b):
 
 def _leaves(stated):
     """The finite numbers in some expressions and relations, in their order."""
-    return [number for number in prefix_tokens(stated, _enter) if number.__class__ in (int, float) and isfinite(number)]
+    found, waiting = [], list(stated)[::-1]
+    while waiting:
+        node = waiting.pop()
+        if node.__class__ not in native_types:
+            if node.is_expression_type():
+                waiting.extend(node.args[::-1])
+                continue
+            node = None if node.is_variable_type() else value(node, exception=False)
+        if node.__class__ in NUMBERS and isfinite(node):
+            found.append(node)
+    return found
 
 
 def _body(stated):
     """One expression whose value depends on all numbers in some expressions and relations."""
     parts = (part for expr in stated for part in (read_side(expr) if isinstance(expr, RelationalExpression) else (expr,)))
     return sum(k * part for k, part in enumerate((part for part in parts if part is not None), start=1))
-
-
-def _enter(node):
-    """The value of a Param; the arguments of an operation."""
-    if node.is_expression_type():
-        return None, list(node.args)
-    return None if node.is_variable_type() else value(node, exception=False), ()
 
 
 def _at_trial(bodies, trial):

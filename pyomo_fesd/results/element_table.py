@@ -26,9 +26,9 @@ class ElementTable:
 
     def __init__(self, model: Block, times: TimeIndex):
         self._model, self._times, self._tau = model, times, moving_grids(model)[times.wrt].grid.tau
-        self._columns = list(columns_over_time(model, times.wrt))
+        self._columns = list(columns_over_time(model, times))
         self._has_positions = bool(self._positions(()))
-        self._rows, self._number, self._at = [], 0, {}
+        self._rows, self._times_of_rows, self._number, self._at = [], [], 0, {}
 
     def begin(self, label: float) -> None:
         """Write the row of the first time."""
@@ -53,7 +53,8 @@ class ElementTable:
             for k, column in enumerate(self._columns) if positions else ():
                 if column.title in positions:
                     found[k] = value_or_nan(positions[column.title].get(label))
-            self._rows.append((time, time, number, *found))
+            self._times_of_rows.append(time)
+            self._rows.append((time, number, *found))
 
     def _contents(self, label):
         """What the columns contain at a label."""
@@ -63,5 +64,5 @@ class ElementTable:
 
     def frame(self) -> pd.DataFrame:
         """Return the trajectory, index ``time``."""
-        names = ['time', 'label', 'element', *(column.title for column in self._columns)]
-        return pd.DataFrame(self._rows, columns=names).set_index('time')
+        names, index = ['label', 'element', *(column.title for column in self._columns)], pd.Index(self._times_of_rows, name='time')
+        return pd.DataFrame(self._rows, index, names)

@@ -40,6 +40,8 @@ def refuse_undetermined(equations: ElementEquations) -> None:
 
 def refuse_undetermined_start(equations: ElementEquations, states: Sequence[VarData]) -> None:
     """Refuse ``states`` that are neither fixed at the first time nor determined by the ``equations`` there."""
+    if not states:
+        return
     chosen = ComponentSet(states)
     others = [v for v in equations.unknown if v not in chosen]
     incidence, known = _incidence(equations, [*others, *states]), len(others)

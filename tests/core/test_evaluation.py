@@ -2,10 +2,20 @@
 
 from math import isnan
 
+import numpy as np
 import pyomo.environ as pyo
 import pytest
+from pyomo.core.expr import Expr_if
 
-from pyomo_fesd.core.evaluation import kept_values, known_sign, mutable_parameters, number_of, value_or_nan, value_or_zero
+from pyomo_fesd.core.evaluation import (
+    kept_values,
+    known_sign,
+    mutable_parameters,
+    number_of,
+    numbers_of,
+    value_or_nan,
+    value_or_zero,
+)
 
 
 @pytest.fixture
@@ -95,3 +105,14 @@ def test_values_and_stale_flags_are_put_back_after_an_error(m):
         m.y.set_value(7)
         raise ZeroDivisionError
     assert (m.x.value, m.y.value, m.y.stale) == (None, 1, True)
+
+
+def test_values_at_several_points():
+    m = pyo.ConcreteModel()
+    m.x, m.y, m.p = pyo.Var(), pyo.Var(), pyo.Param(initialize=2.0, mutable=True)
+    m.e = pyo.Expression(expr=m.p * m.x**2 - m.y / 4)
+    points = {id(m.x): np.array([1.0, 2.0]), id(m.y): np.array([4.0, 8.0])}
+    assert numbers_of(m.e + 1, points).tolist() == [2.0, 7.0]
+    assert numbers_of(1 / (m.x - 1), points) is None
+    assert numbers_of(pyo.sin(m.x), points) is None
+    assert numbers_of(Expr_if(m.x >= 1, m.x, m.y), points) is None

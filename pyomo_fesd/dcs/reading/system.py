@@ -1,6 +1,6 @@
 """Read one Disjunction at one time: its modes, its regions, and the variables that the modes define."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 
 from pyomo.common.collections import ComponentSet
@@ -57,6 +57,22 @@ class HysteresisSystem(ModeSystem):
     conditions: list
 
 
+@dataclass(frozen=True)
+class Analyses:
+    """The analyses of Disjunctions, which hold for all that are built alike.
+
+    Attributes
+    ----------
+    systems : dict key -> (ModeSystem, Stamp)
+    patterns, choices : dict name -> dict
+        sign patterns, and the variables that modes define, of the times of one Disjunction
+    """
+
+    systems: dict = field(default_factory=dict)
+    patterns: dict = field(default_factory=dict)
+    choices: dict = field(default_factory=dict)
+
+
 class SystemReader:
     """Reads Disjunctions of one model; the analysis of one is reused for all that are built alike.
 
@@ -64,12 +80,13 @@ class SystemReader:
     ----------
     variables : TimeVariables
     times : TimeIndex
+    analyses : Analyses
+        those that are known, to which others are added
     """
 
-    def __init__(self, variables, times):
-        self._variables, self._times = variables, times
-        self._patterns, self._choices = {}, {}
-        self._read, self._own = {}, ComponentSet()
+    def __init__(self, variables, times, analyses):
+        self._variables, self._times, self._own = variables, times, ComponentSet()
+        self._patterns, self._choices, self._read = analyses.patterns, analyses.choices, analyses.systems
 
     def read(self, tree, modes) -> ModeSystem:
         """Read the ``modes`` that are left of a tree; the model is not changed."""

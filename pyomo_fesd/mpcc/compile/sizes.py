@@ -129,6 +129,8 @@ def _spread(entries, b, sizes, group):
     """
     b = np.where(np.isfinite(b), b, 0.0)
     for _ in range(SWEEPS):
+        if sizes.all():
+            break
         new = _by_rows_with_one(entries, b, sizes, group)
         if not (new > 0).any():
             new = _by_rows(entries, b, sizes, group)
@@ -142,8 +144,9 @@ def _by_rows_with_one(entries, b, sizes, group):
     """Sizes of variables by the rows in which no other one is without a size."""
     i, j, _ = entries
     without = sizes[j] == 0
-    pairs = np.unique(np.stack([i[without], group[j[without]]]), axis=1)
-    single = np.bincount(pairs[0], minlength=b.size) == 1
+    # each row and group once, as one number
+    pairs = np.unique(i[without] * sizes.size + group[j[without]])
+    single = np.bincount(pairs // max(1, sizes.size), minlength=b.size) == 1
     return _by_rows([part[single[i]] for part in entries], b, sizes, group)
 
 
