@@ -20,7 +20,7 @@ def own_components(block: Block, ctype, descend_into, active: bool | None = None
         place = waiting.pop()
         yield from (c for c in read(place) if not is_reference(c))
         # Disjuncts are many, and most have none of the types
-        found = [b for c in read_inner(place) if not is_reference(c) for b in c.values() if not met.isdisjoint(b._ctypes)]
+        found = [b for c in read_inner(place) if not is_reference(c) for b in data_of(c) if not met.isdisjoint(b._ctypes)]
         waiting += [b for b in reversed(found) if active is None or b.active == active]
 
 
@@ -53,7 +53,7 @@ def own_blocks(block: Block, descend_into: Collection, active: bool | None = Non
     while waiting:
         place = waiting.pop()
         yield place
-        found = [b for c in declared(place, descend_into) if not is_reference(c) for b in c.values()]
+        found = [b for c in declared(place, descend_into) if not is_reference(c) for b in data_of(c)]
         waiting += [b for b in reversed(found) if active is None or b.active == active]
 
 
@@ -65,8 +65,21 @@ def own_data(block: Block, ctype, descend_into, active: bool | None = None) -> I
 
 def data_of(component) -> Iterable:
     """Return the data of a component."""
-    # of a flowsheet over time most are scalar; ``values`` takes three times as long
-    return component.values() if component.is_indexed() else (component,) * len(component)
+    # of a flowsheet over time most are scalar; ``values`` takes three times as long, and makes a Set where any index may be
+    if not component.is_indexed():
+        return (component,) * len(component)
+    data, indices = component._data, component._index_set
+    if data.__class__ is not dict:
+        return component.values()
+    if not indices.isfinite():
+        return list(data.values())
+    return [data[index] for index in indices] if len(data) == len(indices) else component.values()
+
+
+def entries_of(component) -> Iterable:
+    """Return the indices of an indexed component with their data."""
+    # an index of a Reference is not that of its data
+    return component.items() if component.is_reference() else ((data._index, data) for data in data_of(component))
 
 
 def variables_below(block: Block, active: bool | None = None) -> Iterator:

@@ -5,7 +5,7 @@ Written by ``fesd.dcs``, ``fesd.smooth_to_complementarity``, ``state_jump`` and 
 record when it is cloned, and loses it when it is deleted.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -170,6 +170,15 @@ class TimeWriter(AutoSlots.Mixin):
         return lambda expression: expression
 
 
+#: Entries of a record -> their container.
+ENTRIES = (
+    dict.fromkeys(('continuous', 'multipliers'), ComponentMap)
+    | dict.fromkeys(('selectors', 'excluded', 'signals'), ComponentSet)
+    | dict.fromkeys(('steps', 'dependents', 'surfaces', 'hysteresis', 'resets', 'contacts'), list)
+    | dict.fromkeys(('writers', 'waiting', 'breakpoints'), list)
+)
+
+
 class SwitchedSystems(AutoSlots.Mixin):
     """The switched systems among the components of one block.
 
@@ -201,38 +210,11 @@ class SwitchedSystems(AutoSlots.Mixin):
         points that a signal added: boundaries of elements, but not of control stages
     """
 
-    __slots__ = (
-        'continuous',
-        'selectors',
-        'multipliers',
-        'excluded',
-        'steps',
-        'dependents',
-        'surfaces',
-        'hysteresis',
-        'resets',
-        'contacts',
-        'writers',
-        'waiting',
-        'signals',
-        'breakpoints',
-    )
+    __slots__ = tuple(ENTRIES)
 
     def __init__(self):
-        self.continuous, self.multipliers = ComponentMap(), ComponentMap()
-        self.selectors, self.excluded, self.signals = ComponentSet(), ComponentSet(), ComponentSet()
-        self.steps, self.dependents, self.surfaces = [], [], []
-        self.hysteresis, self.resets, self.contacts = [], [], []
-        self.writers, self.waiting, self.breakpoints = [], [], []
-
-    def include(self, other: 'SwitchedSystems') -> 'SwitchedSystems':
-        """Add the entries of another record; returns this one."""
-        for name in self.__slots__:
-            mine, theirs = getattr(self, name), getattr(other, name)
-            # most records have entries of one kind
-            if theirs:
-                mine.extend(theirs) if isinstance(mine, list) else mine.update(theirs)
-        return self
+        for name, container in ENTRIES.items():
+            setattr(self, name, container())
 
     def forget(self, gone: ComponentSet) -> None:
         """Remove the entries of components that are deleted."""
@@ -254,12 +236,27 @@ def switched_systems(block) -> SwitchedSystems:
     return block.private_data(_SCOPE)
 
 
-def all_switched_systems(block) -> SwitchedSystems:
-    """Return one record with the entries of ``block`` and of all active blocks below it, for reading."""
-    found = SwitchedSystems()
-    for record in records_below(block, _SCOPE):
-        found.include(record)
-    return found
+class AllSwitchedSystems:
+    """The entries of several records, for reading: most readers need one kind, which is merged when it is asked for."""
+
+    def __init__(self, records: Sequence[SwitchedSystems]):
+        self._records = records
+
+    def __getattr__(self, name):
+        # called once for each name: then it is an attribute
+        if name not in ENTRIES:
+            raise AttributeError(name)
+        found = ENTRIES[name]()
+        add = found.extend if isinstance(found, list) else found.update
+        for entries in filter(None, (getattr(record, name) for record in self._records)):
+            add(entries)
+        setattr(self, name, found)
+        return found
+
+
+def all_switched_systems(block) -> AllSwitchedSystems:
+    """Return the entries of ``block`` and of all active blocks below it."""
+    return AllSwitchedSystems(list(records_below(block, _SCOPE)))
 
 
 def signals(wrt) -> list:

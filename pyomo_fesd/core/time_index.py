@@ -10,7 +10,7 @@ from pyomo.dae import ContinuousSet, DerivativeVar
 from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd.core.errors import FesdError
-from pyomo_fesd.core.own_data import data_of, declared
+from pyomo_fesd.core.own_data import data_of, declared, entries_of
 
 #: Endings of the names of pyomo.dae's own equations.
 DISCRETISATION = ('_disc_eq', '_cont_eq')
@@ -173,7 +173,7 @@ class TimeIndex:
                         groups[name][time] = data
                 continue
             by_rest = {}
-            for index, data in component.items():
+            for index, data in entries_of(component):
                 index = index_tuple(index)
                 rest = index[:position], index[position + 1 :]
                 if rest not in by_rest:

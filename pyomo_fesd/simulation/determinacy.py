@@ -2,6 +2,7 @@
 
 from bisect import bisect_left
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 from pyomo.common.collections import ComponentSet
@@ -83,12 +84,6 @@ def _incidence(equations, unknown):
     columns = {id(v): j for j, v in enumerate(unknown)}
     determining = [(row,) for row in equations.all_rows if isinstance(row, EqualityExpression)]
     determining += map(read_complementarity, equations.conditions)
-    entries = [
-        (i, columns[id(v)])
-        for i, row in enumerate(determining)
-        for part in row
-        for v in variables_that_count(part)
-        if id(v) in columns
-    ]
-    rows, where = zip(*entries) if entries else ((), ())
-    return csr_matrix((np.ones(len(entries)), (rows, where)), shape=(len(determining), len(columns)))
+    rows = [sorted({columns[id(v)] for part in row for v in variables_that_count(part) if id(v) in columns}) for row in determining]
+    ends = np.cumsum([0, *map(len, rows)])
+    return csr_matrix((np.ones(ends[-1]), np.fromiter(chain(*rows), int, ends[-1]), ends), shape=(len(rows), len(columns)))

@@ -130,7 +130,8 @@ def _rises_first(polynomial, nodes, row):
 
 def _first_fall(polynomial, nodes, row):
     """The first root at which the polynomial falls; without one, the middle before the first negative node."""
-    falls = [x for x in _real_roots(polynomial) if AT_ONCE < x <= 1.0 and polynomial.deriv()(x) < 0]
+    slope = polynomial.deriv()
+    falls = [x for x in _real_roots(polynomial) if AT_ONCE < x <= 1.0 and slope(x) < 0]
     if falls:
         return falls[0]
     first = int(np.argmax(row < 0))

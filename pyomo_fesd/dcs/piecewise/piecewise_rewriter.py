@@ -30,6 +30,7 @@ from pyomo_fesd.core import (
     discretised,
     is_discretisation_equation,
     is_generated,
+    own_data,
 )
 from pyomo_fesd.dcs.piecewise import expr_if, multivariate, univariate
 from pyomo_fesd.dcs.piecewise.replaced_constraints import deactivate, replace_constraint
@@ -134,8 +135,8 @@ SOUGHT = frozenset(WRITERS) | {PiecewiseLinearFunction}
 
 def _refuse_written_by_pyomo(block, times):
     """Refuse Pyomo's own Disjunctions of a piecewise function: their regions do not cover points outside its domain."""
-    for disjunction in block.component_data_objects(Disjunction, active=True, descend_into=Block):
-        above = disjunction.parent_block()
+    for disjunction in own_data(block, Disjunction, Block, active=True):
+        above = disjunction.parent_block() if disjunction.active else None
         while above is not None and not above.local_name.startswith(WRITTEN_BY_PYOMO):
             above = above.parent_block()
         if above is not None and any(times.time(v) is not None for v in _disjunction_variables(disjunction)):
