@@ -79,23 +79,28 @@ class CasadiExpressions:
 
     def _prefix(self, expr, met):
         """Operations before their arguments, the last of these first."""
-        tokens, waiting = [], [expr]
+        tokens, waiting, symbols = [], [expr], self._symbols
         while waiting:
             node = waiting.pop()
             kind = node.__class__
-            if kind in native_numeric_types or node is None:
-                tokens.append(self._number(node))
-            elif kind is VarData or node.is_variable_type():
+            if kind is VarData:
                 met[id(node)] = node
-                tokens.append(self._symbols[id(node)])
+                tokens.append(symbols[id(node)])
+            elif kind in native_numeric_types or node is None:
+                tokens.append(self._number(node))
+            elif (operation := _operation(kind)) is not None:
+                arguments = node.args
+                tokens.append((operation, node, len(arguments)))
+                waiting.extend(arguments)
+            elif node.is_variable_type():
+                met[id(node)] = node
+                tokens.append(symbols[id(node)])
             elif not node.is_expression_type():
                 tokens.append(self._number(value(node, exception=False)))
             elif node.is_named_expression_type():
                 waiting.append(node.expr)
             else:
-                arguments = node.args
-                tokens.append((_operation(kind), node, len(arguments)))
-                waiting.extend(arguments)
+                raise Unsupported(kind)
         return tokens
 
     def _number(self, number):
@@ -110,7 +115,5 @@ class CasadiExpressions:
 
 @cache
 def _operation(kind):
-    for known, operation in OPERATIONS.items():
-        if issubclass(kind, known):
-            return operation
-    raise Unsupported(kind)
+    """How nodes of a class are written; None where ``OPERATIONS`` does not say."""
+    return next((operation for known, operation in OPERATIONS.items() if issubclass(kind, known)), None)

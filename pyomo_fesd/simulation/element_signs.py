@@ -90,7 +90,7 @@ class ElementSigns:
         known, falling = np.isfinite(left), row[0] < 0
         if known:
             nodes, row = np.append(0.0, nodes), np.append(max(left, 0.0), row)
-        polynomial = np.polynomial.Polynomial.fit(nodes, row, nodes.size - 1, domain=[0, 1], window=[0, 1])
+        polynomial = np.polynomial.Polynomial(np.linalg.solve(np.vander(nodes, increasing=True), row))
         at_zero = left if known else polynomial(0.0)
         if at_zero <= small and falling and not (known and _rises_first(polynomial, nodes, row)):
             return None
