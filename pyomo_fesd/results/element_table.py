@@ -26,7 +26,7 @@ class ElementTable:
 
     def __init__(self, model: Block, times: TimeIndex):
         self._model, self._times, self._tau = model, times, moving_grids(model)[times.wrt].grid.tau
-        self._columns = list(columns_over_time(model, times))
+        self._columns = list(columns_over_time(model, times.wrt))
         self._has_positions = bool(self._positions(()))
         self._rows, self._times_of_rows, self._number, self._at = [], [], 0, {}
 

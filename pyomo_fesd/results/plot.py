@@ -9,7 +9,7 @@ import numpy as np
 from pyomo.core import Block
 from pyomo.dae import ContinuousSet
 
-from pyomo_fesd.core import FesdError, TimeIndex, derivatives, find_continuous_set, is_generated
+from pyomo_fesd.core import FesdError, derivatives, find_continuous_set, is_generated
 from pyomo_fesd.results.physical_time import element_lengths, elements
 from pyomo_fesd.results.switches import switches
 from pyomo_fesd.results.trajectory import columns_over_time, rows_over_time, trajectory
@@ -43,7 +43,7 @@ def plot(
     """
     wrt = find_continuous_set(model, wrt, 'plot')
     names, units = _checked_names(names), _checked_units(units)
-    frame, columns = trajectory(model, wrt), list(columns_over_time(model, TimeIndex(wrt)))
+    frame, columns = trajectory(model, wrt), list(columns_over_time(model, wrt))
     names = names or _states_and_multipliers(model, wrt, columns)
     groups = [(name, _named(columns, name)) for name in names]
     boundaries = element_lengths(model, wrt)['end']

@@ -86,17 +86,18 @@ def trajectory(model: Block, wrt: ContinuousSet | None = None) -> pd.DataFrame:
     wrt = find_continuous_set(model, wrt, 'trajectory')
     times, rows = physical_time(model, wrt), rows_over_time(model, wrt)
     table = {'label': [r.label for r in rows], 'element': [r.element for r in rows]}
-    for column in columns_over_time(model, TimeIndex(wrt)):
+    for column in columns_over_time(model, wrt):
         table[column.title] = [r.number(column.values.get(r.label)) for r in rows]
     return pd.DataFrame(table, index=pd.Index([times[r.label] for r in rows], name='time'))
 
 
-def columns_over_time(model: Block, times: TimeIndex) -> Iterator[Column]:
+def columns_over_time(model: Block, wrt: ContinuousSet) -> Iterator[Column]:
     """Yield the columns of a trajectory: variables and expressions, then the multipliers of modes."""
+    times = TimeIndex(wrt)
     own = (c for c in own_components(model, (Var, Expression), Block) if not is_generated(c))
     for name, by_time in times.families_in(own).items():
         yield Column(strip_time(name), None, by_time)
-    systems = disjunction_modes(model, times) | complementarity_positions(model, times.wrt, times, elements_if_any(times.wrt))
+    systems = disjunction_modes(model, times) | complementarity_positions(model, wrt, times, elements_if_any(wrt))
     for name, modes in systems.items():
         for mode, weights in modes.items():
             yield Column(name, mode, weights)

@@ -73,7 +73,7 @@ def start_from(model: Block, source: pd.DataFrame | Block, wrt: ContinuousSet | 
     wrt = find_continuous_set(model, wrt, 'start_from')
     if wrt not in moving_grids(model):
         raise FesdError(wrt, "start_from: its elements are not movable", "apply fesd.finite_elements first")
-    columns = {c.title: c for c in columns_over_time(model, TimeIndex(wrt))}
+    columns = {c.title: c for c in columns_over_time(model, wrt)}
     is_model = hasattr(source, 'component_objects')
     table = TimeTable(_table_of(source, model, wrt, columns) if is_model else source, columns)
     constants = list(_constants(model, source, TimeIndex(wrt))) if is_model else []
