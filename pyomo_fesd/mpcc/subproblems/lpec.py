@@ -111,12 +111,14 @@ class Lpec:
         multipliers : array, optional
             of the branch's rows, positive at lower bounds, to try weak duality with
         enough : float, optional
-            a relative descent below this does not count: weak duality may end the search, and a clear descent branch and bound
+            a relative descent of at most this does not count: weak duality may end the search, and without ``limits`` a clear
+            descent branch and bound
         limits : dict, optional
-            HiGHS options of this call; when one of them ends the search, the best direction so far is taken
+            HiGHS options of a call that proves nothing; when one of them ends the search, the best direction so far is taken
         """
         found = self._solve(w, sets, Delta, equal, beyond, multipliers, enough, limits, released=False)
-        if enough is None or not self._c.fillings or not found.solved or found.descent > enough:
+        proves = enough is not None and limits is None
+        if not (proves and self._c.fillings and found.solved) or found.descent > enough:
             return found
         further = self._solve(w, sets, Delta, equal, beyond, multipliers, enough, limits, released=True)
         return further if further.descent > max(enough, BEYOND_FILLINGS) else found
@@ -132,7 +134,7 @@ class Lpec:
             y = self._row_multipliers(multipliers, sets, equal)
             if descent.proved(y) <= enough and not self._matters(w, descent, descent.least(y)):
                 return LpecResult(True, 0.0, np.zeros(len(w)), sets.zero, 0)
-        found = self.best(sets, at, descent, True, limits)
+        found = self.best(sets, at, descent, limits is None, limits)
         return replace(found, matters=found.descent <= enough and self._matters(w, descent, found.value))
 
     def _matters(self, w, descent, value):
