@@ -281,7 +281,9 @@ class Branches:
         if np.count_nonzero(sets.gamma) <= point.certificate.biactive:
             return None
         limits = self._subsolves.patience() | (limits or {})
-        step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal, limits=limits)
+        # where the multipliers of the point show that no side descends, there is nothing to search for
+        shown = {'multipliers': -point.nlp.lam_g, 'enough': clear}
+        step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal, limits=limits, **shown)
         if not step.solved or step.descent <= clear:
             return None
         better = self._point(point.w + step.d, step.zero, None, False)

@@ -15,6 +15,7 @@ from pyomo_fesd.mpcc.compile.assemble import NATURAL_UNITS
 from pyomo_fesd.mpcc.compile.casadi_matrices import csr_pattern, take
 from pyomo_fesd.mpcc.compile.compile import compile_mpcc
 from pyomo_fesd.mpcc.compile.derivatives import Derivatives, Outer, automatic, composed, plain_nlp, with_parts
+from pyomo_fesd.mpcc.compile.last_points import LastPoints
 from pyomo_fesd.mpcc.compile.model_values import Contradiction, start_value
 from pyomo_fesd.mpcc.compile.parameters import parameter_data
 from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc

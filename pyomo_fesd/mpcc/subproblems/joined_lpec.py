@@ -21,7 +21,7 @@ from pyomo_fesd.mpcc.subproblems.active_set import FREE
 from pyomo_fesd.mpcc.subproblems.copy_columns import columns_of_row
 from pyomo_fesd.mpcc.subproblems.descent import Descent
 from pyomo_fesd.mpcc.subproblems.linear_program import Program
-from pyomo_fesd.mpcc.subproblems.lpec import Linearised, row_places, sizes_of
+from pyomo_fesd.mpcc.subproblems.lpec import row_places, sizes_of
 from pyomo_fesd.mpcc.subproblems.parts import SHARED
 
 #: Agreement of gradients, relative to the largest one, and of values.
@@ -116,7 +116,7 @@ class JoinedLpec:
 
     def linearised(self, base, points, credits, limits, fixed):
         """The LPEC with the copies, without its binaries."""
-        p, y = self._with_fixed(base.program, fixed), self._last
+        p = self._with_fixed(base.program, fixed)
         low, high, lower, upper, reach = (list(of_copies) for of_copies in zip(*limits))
         cost, A = self._joined(*points)
         cost[self._places_of_extents] += credits
@@ -126,9 +126,7 @@ class JoinedLpec:
         still = self._fixed_ends(fixed)
         lower[still] = upper[still] = 0.0
         self._pass_on_bounds(lower, upper, reach)
-        program = Program(cost, A, low, high, lower, upper, reach)
-        half = A.shape[0] - y // 2
-        return Linearised(program, base.equal, base.G, base.H, A[A.shape[0] - y : half], A[half:])
+        return replace(base, program=Program(cost, A, low, high, lower, upper, reach))
 
     def _pass_on_bounds(self, lower, upper, reach):
         """Make bounds that are conditions on the end of k those of the end of the last copy behind it."""

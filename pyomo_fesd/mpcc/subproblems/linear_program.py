@@ -29,8 +29,9 @@ TOLERANCES = ('primal_feasibility_tolerance', 'dual_feasibility_tolerance', 'mip
 THREADS = {'threads': 1}
 #: The equilibrated cost has entries up to 1; the defaults (1e-6 and 1e-4) would call d = 0 optimal beside a small descent.
 GAPS = {'mip_abs_gap': 1e-9, 'mip_rel_gap': 1e-6}
-#: d = 0 is a first solution; to search for one takes most of the time of a small program.
-STARTED = {'mip_heuristic_run_feasibility_jump': False}
+#: d = 0 is a first solution; to search for one takes most of the time of a small program, and so do smaller programs with binaries
+#: that HiGHS solves at the root for a better one.
+STARTED = {f'mip_heuristic_run_{name}': False for name in ('feasibility_jump', 'rins', 'rens', 'root_reduced_cost')}
 ENDED_WELL = (highspy.HighsModelStatus.kOptimal, highspy.HighsModelStatus.kObjectiveTarget)
 LIMITED = (highspy.HighsModelStatus.kSolutionLimit, highspy.HighsModelStatus.kIterationLimit, highspy.HighsModelStatus.kTimeLimit)
 #: Branch and bound ends at a direction with this descent, where the largest entry of the cost descends by 1.

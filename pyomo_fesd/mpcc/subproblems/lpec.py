@@ -24,7 +24,7 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from pyomo_fesd.mpcc.compile import major_index, with_entries
+from pyomo_fesd.mpcc.compile import LastPoints, major_index, with_entries
 from pyomo_fesd.mpcc.nlp import Deadline, check_options
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO
 from pyomo_fesd.mpcc.subproblems.descent import Descent
@@ -70,14 +70,15 @@ class LpecResult:
 
 @dataclass(frozen=True)
 class Linearised:
-    """The LPEC at one point, without its binaries: the Program, its row blocks, and value and Jacobian of bi-active sides."""
+    """The LPEC at one point, without its binaries: the Program, decisions in force, and values of bi-active sides.
+
+    The Program's last rows are those of G and H of the bi-active pairs.
+    """
 
     program: Program
     equal: np.ndarray
     G: np.ndarray
     H: np.ndarray
-    J_G: object
-    J_H: object
 
 
 class Lpec:
@@ -100,6 +101,7 @@ class Lpec:
     def __init__(self, compiled, sides, options, deadline=None):
         check_options('HiGHS', options, refusal, 'lpec_options')
         self._c, self._sides, self._options, self._deadline = compiled, sides, options, deadline or Deadline()
+        self._known_changes = LastPoints(self._changes)
 
     def solve(self, w, sets, Delta, equal=None, beyond=False, multipliers=None, enough=None, limits=None) -> LpecResult:
         """Solve the LPEC at ``w`` with active sets ``sets``, trust region ``Delta`` and the decisions ``equal`` imposed.
@@ -111,12 +113,14 @@ class Lpec:
         multipliers : array, optional
             of the branch's rows, positive at lower bounds, to try weak duality with
         enough : float, optional
-            a relative descent below this does not count: weak duality may end the search, and a clear descent branch and bound
+            a relative descent of at most this does not count: weak duality may end the search, and without ``limits`` a clear
+            descent branch and bound
         limits : dict, optional
-            HiGHS options of this call; when one of them ends the search, the best direction so far is taken
+            HiGHS options of a call that proves nothing; when one of them ends the search, the best direction so far is taken
         """
         found = self._solve(w, sets, Delta, equal, beyond, multipliers, enough, limits, released=False)
-        if enough is None or not self._c.fillings or not found.solved or found.descent > enough:
+        proves = enough is not None and limits is None
+        if not (proves and self._c.fillings and found.solved) or found.descent > enough:
             return found
         further = self._solve(w, sets, Delta, equal, beyond, multipliers, enough, limits, released=True)
         return further if further.descent > max(enough, BEYOND_FILLINGS) else found
@@ -132,7 +136,7 @@ class Lpec:
             y = self._row_multipliers(multipliers, sets, equal)
             if descent.proved(y) <= enough and not self._matters(w, descent, descent.least(y)):
                 return LpecResult(True, 0.0, np.zeros(len(w)), sets.zero, 0)
-        found = self.best(sets, at, descent, True, limits)
+        found = self.best(sets, at, descent, limits is None, limits)
         return replace(found, matters=found.descent <= enough and self._matters(w, descent, found.value))
 
     def _matters(self, w, descent, value):
@@ -156,8 +160,7 @@ class Lpec:
 
     def _linearised(self, w, sets, equal, reach, lower, upper, released):
         c = self._c
-        at, gradients = c.evaluate(w), c.gradients(w)
-        _, _, J_G, J_H, _ = gradients
+        at = c.evaluate(w)
         G, H = np.maximum(at.G, 0.0), np.maximum(at.H, 0.0)
         alpha, beta, gamma, free = sets.alpha, sets.beta, sets.gamma, sets.open
         filled = _pairs_of(c.fillings if released else (), c.pairs)
@@ -166,11 +169,15 @@ class Lpec:
         high = [np.maximum(c.ubg - at.g, 0.0), 0.0, np.inf, 0.0, np.inf, 0.0, np.inf, np.inf, np.inf, np.inf]
         places = row_places(sets, equal, len(c.lbg))
         low, high = (np.concatenate([np.broadcast_to(v, len(rows)) for v, rows in zip(by, places)]) for by in (low, high))
-        program = Program(gradients[0], c.stacked_jacobian(w)[np.concatenate(places)], low, high, lower, upper, reach)
-        return Linearised(program, equal, G[gamma], H[gamma], J_G[gamma], J_H[gamma])
+        program = Program(c.gradients(w)[0], c.stacked_jacobian(w)[np.concatenate(places)], low, high, lower, upper, reach)
+        return Linearised(program, equal, G[gamma], H[gamma])
 
     def changes(self, w):
         """Changes of the gradient and of all rows along displacements of all variables by their sizes, within their bounds."""
+        # several LPECs are solved at one point
+        return self._known_changes(w, np.concatenate([self._c.parameters, self._c.lbx, self._c.ubx]))
+
+    def _changes(self, w, _):
         random, sizes = np.random.default_rng(SEED), sizes_of(w)
         gradient, A, changes = self._c.gradients(w)[0], self._c.stacked_jacobian(w), []
         for _ in range(DISPLACEMENTS):
@@ -211,8 +218,9 @@ class Lpec:
         p, n, y = at.program, len(at.program.cost), int(sets.gamma.sum())
         A, high = p.A, p.high
         if y:
-            M_G, M_H = _big_m(at.J_G, at.G, p.lower, p.upper), _big_m(at.J_H, at.H, p.lower, p.upper)
-            A = _with_binaries(A, at.J_G, at.J_H, M_G, M_H)
+            J_G, J_H = A[-2 * y : -y], A[-y:]
+            M_G, M_H = _big_m(J_G, at.G, p.lower, p.upper), _big_m(J_H, at.H, p.lower, p.upper)
+            A = _with_binaries(A, J_G, J_H, M_G, M_H)
             high = np.concatenate([high, -at.G, M_H - at.H])
         program = Program(
             np.concatenate([p.cost, np.zeros(y)]),
