@@ -44,9 +44,11 @@ from pyomo_fesd.core.grid import (
 from pyomo_fesd.core.held_controls import held_controls
 from pyomo_fesd.core.homotopy_hints import (
     BranchConstraint,
+    DriftSides,
     Filling,
     Follower,
     HomotopyHints,
+    ImpactSides,
     NeighbourBranch,
     Penalty,
     all_hints,

@@ -28,6 +28,8 @@ class MpccData:
     parts : list of PartIndices
     followers : FollowerIndices
     fillings : list of FillingIndices
+    impacts : list of ImpactIndices
+    drifts : list of DriftIndices
     tentative : bool array, decisions that are dropped where they leave no solution
     """
 
@@ -51,4 +53,6 @@ class MpccData:
     parts: list
     followers: object
     fillings: list
+    impacts: list
+    drifts: list
     tentative: np.ndarray
