@@ -21,7 +21,8 @@ LAST, AROUND = 1e-3, (1e-1, 1e-2)
 #: Times that relaxations go around the best point at most, and the part by which its objective must fall to go on.
 CYCLES, PROGRESS = 6, 1e-3
 #: First eps of a second path, relative to that of the first; it is followed where the relaxations around the best point have an
-#: objective that is smaller by the second part, or the third part of the first path's relaxations did not reach their solutions.
+#: objective that is smaller by the second part, or the first path went astray: the third part of its relaxations did not reach
+#: their solutions, or one was infeasible.
 LOOSER, GAP, ASTRAY = 10.0, 0.5, 0.5
 #: Part of the time limit after which no further round begins: the best point is certified in the rest.
 SHARE = 0.6
@@ -64,16 +65,17 @@ class Completions:
             self._certify()
 
     def _down(self, w, eps):
-        """Rounds with ever smaller eps, each from the relaxation before; returns whether many did not reach their solutions.
+        """Rounds with ever smaller eps, each from the relaxation before; returns whether they went astray.
 
-        The points of a relaxation with a smaller eps are among those of one before: after an infeasible one there is none.
+        That is, if many did not reach their solutions, or one ended as infeasible.  The points of a relaxation with a smaller eps
+        are among those of one before: after an infeasible one there is none.
         """
         solved = []
         while eps * ROUND_OFF >= max(LAST, self._options.eps_final) and not self._deadline.expired():
             relaxed = self._round(w, eps)
             solved.append(relaxed.solved)
             if relaxed.status in INFEASIBLE:
-                break
+                return True
             w = relaxed.w
             eps *= self._options.eps_factor
         return solved.count(False) >= ASTRAY * len(solved)
