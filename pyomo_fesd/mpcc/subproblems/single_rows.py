@@ -18,7 +18,9 @@ def fix_single(c, w, lbx, ubx, lbg, ubg):
     if not len(rows):
         return
     slopes = np.asarray(c.gradients(w)[1][rows, columns]).ravel()
-    value = w[columns] + (c.lbg[rows] - c.evaluate(w).g[rows]) / slopes
+    with np.errstate(divide='ignore', invalid='ignore'):
+        # a parameter may have made a slope zero
+        value = w[columns] + (c.lbg[rows] - c.evaluate(w).g[rows]) / slopes
     for bound in (lbx.copy(), ubx.copy()):
         at = (np.abs(value - bound[columns]) <= AT_BOUND) & (lbx[columns] < ubx[columns])
         lbx[columns[at]] = ubx[columns[at]] = bound[columns[at]]
