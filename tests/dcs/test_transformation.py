@@ -10,7 +10,7 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd import FesdError
+from pyomo_fesd import FesdError, simulate
 from tests import models
 from tests.models import (
     EVERYWHERE,
@@ -703,3 +703,26 @@ def test_opposite_conditions_are_recognised_at_any_start_value(form, start):
     m = signum(x0=start)
     dcs(m, form=form)
     assert not m.sgn[0].active
+
+
+@pytest.mark.parametrize('first, then, end', [(1, -1, 3.0), (-1, 1, 5 / 3), (1, 2, 5 / 3)])
+def test_a_parameter_that_changes_between_the_transformations_counts(first, then, end):
+    # x' = 3 below 0 and 1 above it, or with p < 0 the other way round, from -1; 1/2 above 3
+    m = pyo.ConcreteModel()
+    m.t, m.p = dae.ContinuousSet(bounds=(0, 2)), pyo.Param(initialize=first, mutable=True)
+    m.x = pyo.Var(m.t, initialize=-1)
+    m.dx = dae.DerivativeVar(m.x, wrt=m.t)
+    m.x[0].fix()
+    m.mode = Disjunction(
+        m.t,
+        rule=lambda m, t: [
+            [m.p * m.x[t] <= 0, m.x[t] <= 3, m.dx[t] == 3],
+            [m.p * m.x[t] >= 0, m.x[t] <= 3, m.dx[t] == 1],
+            [m.x[t] >= 3, m.dx[t] == 0.5],
+        ],
+    )
+    pyo.TransformationFactory('fesd.dcs').apply_to(m)
+    m.p.value = then
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=6, ncp=2)
+    simulate(m)
+    assert m.x[2].value == pytest.approx(end)

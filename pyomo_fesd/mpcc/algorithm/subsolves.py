@@ -27,7 +27,7 @@ from pyomo_fesd.mpcc.subproblems import (
 #: With both sides within this factor of the root of the largest product, a pair is undecided.
 BIACTIVE = 3.0
 #: HiGHS for an LPEC that only suggests a branch: the first solution is enough, in this share of the time that the NLPs took.  The
-#: least time is several times what programs of few pairs need, so that the answer does not depend on the load of the machine.
+#: least time is several times what programs of few pairs need: on a loaded machine their searches end as on an idle one.
 SUGGESTION = {'mip_max_nodes': 100, 'mip_max_improving_sols': 1, 'presolve': 'off'}
 SHARE, LEAST_TIME = 0.2, 0.5
 #: Statuses of a problem that an NLP solver found infeasible: the model's own rows may hold there, the pairs do not.

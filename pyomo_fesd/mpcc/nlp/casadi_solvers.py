@@ -96,7 +96,7 @@ class _CasadiNlp(NlpSolver):
         # casadi's warnings would go to the stderr of the whole process
         settings = {'print_time': False, 'show_eval_warnings': False, 'iteration_callback': self._watch}
         self._own, self._options, self._made = settings, (budget, options), {}
-        self._name, self._problem, self._derivatives = name, (x, p, f, g), derivatives
+        self._name, self._problem, self._derivatives = name, {'x': x, 'p': p, 'f': f, 'g': g}, derivatives
 
     @abstractmethod
     def _settings(self, budget, options, warm=False):
@@ -123,20 +123,14 @@ class _CasadiNlp(NlpSolver):
         """casadi's options without those of the solver itself."""
         if not self.TAKES_DERIVATIVES:
             return self._own
-        x, p, f, g = self._problem
+        x, p, f, g = self._problem.values()
         return self._own | WITHOUT_PARAMETERS | _functions(x, p, f, g, self._derivatives or automatic(x, f, g))
-
-    @cached_property
-    def _oracle(self):
-        """f and g, made once for both starts: from expressions casadi would make them again for each solver."""
-        x, p, f, g = self._problem
-        return ca.Function('nlp', [x, p], [f, g], ['x', 'p'], ['f', 'g'])
 
     def _solver_for(self, warm):
         """The solver for a start without or with multipliers, made when it is first needed."""
         if warm not in self._made:
             settings = self._given | {self.PLUGIN: self._settings(*self._options, warm)}
-            self._made[warm] = ca.nlpsol(self._name, self.PLUGIN, self._oracle, settings)
+            self._made[warm] = ca.nlpsol(self._name, self.PLUGIN, self._problem, settings)
         return self._made[warm]
 
     def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
@@ -160,7 +154,8 @@ class _CasadiNlp(NlpSolver):
     def _failed(self, w0, p, m, status='error'):
         """The result if the solver returns no point."""
         w = np.array(w0, dtype=float)
-        return NlpResult(w, float(self._oracle(w, p)[0]), status, 0, np.zeros(m), np.zeros(len(w)))
+        f = ca.Function('f', [self._problem['x'], self._problem['p']], [self._problem['f']])(w, p)
+        return NlpResult(w, float(f), status, 0, np.zeros(m), np.zeros(len(w)))
 
 
 class CasadiIpopt(_CasadiNlp):
