@@ -51,6 +51,7 @@ from pyomo_fesd.core.homotopy_hints import (
     ImpactSides,
     NeighbourBranch,
     Penalty,
+    StickingSides,
     all_hints,
     homotopy_hints,
 )

@@ -140,6 +140,27 @@ class ImpactSides:
 
 
 @dataclass(frozen=True, eq=False)
+class StickingSides:
+    """Bodies that must not slip, at one boundary: where they meet and touch from then on, their impulse is free (theory, eq. 24).
+
+    Without an impulse the bodies could only meet at no velocity: a branch without interior.
+
+    Attributes
+    ----------
+    pair : ComplementarityData
+        with the impulse as its first side, the slip velocity after it as the second one
+    meeting : tuple of VarData
+        the distance at the boundary and the forces before it
+    after : tuple of VarData
+        the distances in the element after
+    """
+
+    pair: ComplementarityData
+    meeting: tuple[VarData, ...]
+    after: tuple[VarData, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class DriftSides:
     """The drift of a curved contact and its normal velocity at one point, one of which is 0 (theory, eq. 22).
 
@@ -179,6 +200,7 @@ class HomotopyHints(AutoSlots.Mixin):
     followers : list of Follower
     fillings : list of Filling
     impacts : list of ImpactSides
+    stickings : list of StickingSides
     drifts : list of DriftSides
     alike : list of tuples of VarData
         variables that are the same quantity at different places, and have one size
@@ -195,6 +217,7 @@ class HomotopyHints(AutoSlots.Mixin):
         'followers',
         'fillings',
         'impacts',
+        'stickings',
         'drifts',
         'alike',
     )
@@ -211,6 +234,7 @@ class HomotopyHints(AutoSlots.Mixin):
         self.followers = []
         self.fillings = []
         self.impacts = []
+        self.stickings = []
         self.drifts = []
 
 
@@ -266,5 +290,6 @@ def all_hints(model: Block) -> HomotopyHints:
         total.followers += hints.followers
         total.fillings += hints.fillings
         total.impacts += hints.impacts
+        total.stickings += hints.stickings
         total.drifts += hints.drifts
     return total

@@ -20,6 +20,7 @@ from pyomo_fesd.mpcc.compile.hint_indices import (
     FollowerIndices,
     ImpactIndices,
     NeighbourIndices,
+    StickingIndices,
 )
 from pyomo_fesd.mpcc.compile.model_values import ModelValues, start_values, stated_bounds
 from pyomo_fesd.mpcc.compile.mpcc_data import MpccData
@@ -159,6 +160,7 @@ class _Assembly:
             followers=_followers(hints.followers, positions[0]),
             fillings=_fillings(hints.fillings, *positions, scale.x),
             impacts=_impacts(hints.impacts, *positions, of_rows),
+            stickings=_stickings(hints.stickings, *positions),
             drifts=_drifts(hints.drifts, positions[1], of_rows),
             **values.read(),
         )
@@ -255,6 +257,16 @@ def _impacts(impacts, pairs, columns, rows):
             within, before = (positions_of(some, columns) for some in (impact.within, impact.before))
             of_pairs = positions_of(impact.pairs, pairs)
             found.append(ImpactIndices(impact.boundary, of_pairs, above, below, rows[id(impact.room)], within, before))
+    return found
+
+
+def _stickings(stickings, pairs, columns):
+    """The boundaries of bodies that must not slip by positions, without those of which something is not in the problem."""
+    found = []
+    for sides in stickings:
+        if id(sides.pair) in pairs and all(id(v) in columns for v in (*sides.meeting, *sides.after)):
+            meeting, after = (positions_of(some, columns) for some in (sides.meeting, sides.after))
+            found.append(StickingIndices(pairs[id(sides.pair)][0], meeting, after))
     return found
 
 

@@ -181,6 +181,15 @@ class ImpactIndices:
 
 
 @dataclass(frozen=True, eq=False)
+class StickingIndices:
+    """A ``StickingSides`` by positions of its pair and variables."""
+
+    pair: int
+    meeting: np.ndarray
+    after: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class DriftIndices:
     """A ``DriftSides`` by positions of variables and of its row."""
 

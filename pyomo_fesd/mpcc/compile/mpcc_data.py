@@ -29,6 +29,7 @@ class MpccData:
     followers : FollowerIndices
     fillings : list of FillingIndices
     impacts : list of ImpactIndices
+    stickings : list of StickingIndices
     drifts : list of DriftIndices
     tentative : bool array, decisions that are dropped where they leave no solution
     """
@@ -54,5 +55,6 @@ class MpccData:
     followers: object
     fillings: list
     impacts: list
+    stickings: list
     drifts: list
     tentative: np.ndarray

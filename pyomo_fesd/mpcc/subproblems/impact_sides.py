@@ -1,6 +1,6 @@
 """Sides and bounds of the laws of contacts that leave a branch NLP an interior (theory, eq. 21 and 22).
 
-Takes: ``ImpactIndices`` and ``DriftIndices``, an assignment and the bounds of its branch.
+Takes: ``ImpactIndices``, ``StickingIndices`` and ``DriftIndices``, an assignment and the bounds of its branch.
 Leaves: the assignment in which impulses are free only where bodies meet; bounds that equations imply are left out.
 """
 
@@ -11,13 +11,16 @@ import numpy as np
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO
 
 
-def with_impacts(impacts, zero, ubx):
+def with_impacts(c, zero, ubx):
     """The assignment with the sides of impacts that upper bounds ``ubx`` of its branch decide."""
     new, by_boundary = zero.copy(), defaultdict(list)
-    for impact in impacts:
+    for impact in c.impacts:
         if _meets(impact, ubx):
             new[impact.pairs] = H_ZERO
         by_boundary[impact.boundary].append(impact)
+    for sticking in c.stickings:
+        if not np.any(ubx[sticking.meeting]) and not np.any(ubx[sticking.after]):
+            new[sticking.pair] = H_ZERO
     for beside in by_boundary.values():
         if all(_touched(impact, ubx) for impact in beside if np.any(new[impact.pairs] != G_ZERO)):
             for impact in beside:

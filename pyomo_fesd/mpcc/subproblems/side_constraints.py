@@ -123,7 +123,7 @@ def settle(c, sides, w, zero):
     zero = _without_superfluous(c, sides, w, _filled(c.fillings, w, _follow(c.followers, zero)))
     if not c.impacts:
         return zero
-    return _without_superfluous(c, sides, w, with_impacts(c.impacts, zero, sides.bounds(zero, c.lbx, c.ubx)[1]))
+    return _without_superfluous(c, sides, w, with_impacts(c, zero, sides.bounds(zero, c.lbx, c.ubx)[1]))
 
 
 def _without_superfluous(c, sides, w, zero):
