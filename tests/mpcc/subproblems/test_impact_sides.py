@@ -41,6 +41,22 @@ def row_of_bodies(number=1, curved=False):
     return m
 
 
+def body_that_must_not_slip():
+    """A body with a height and a place along the ground, on which it must not slip."""
+    m = pyo.ConcreteModel()
+    m.t, m.i = dae.ContinuousSet(bounds=(0, 3)), pyo.RangeSet(2)
+    m.q, m.v = pyo.Var(m.i, m.t, initialize=0.5), pyo.Var(m.i, m.t, initialize=0)
+    m.u = pyo.Var(m.i, bounds=(-2, 2), initialize=-1)
+    m.dq, m.dv = dae.DerivativeVar(m.q, wrt=m.t), dae.DerivativeVar(m.v, wrt=m.t)
+    m.touch = pyomo_fesd.contact(m.t, gap=lambda m, t: m.q[1, t], friction=0.5, slip=lambda m, t: m.v[2, t], sticks=True)
+    m.up = pyo.Constraint(m.t, rule=lambda m, t: m.dv[1, t] == m.u[1] + m.touch[t].normal)
+    m.along = pyo.Constraint(m.t, rule=lambda m, t: m.dv[2, t] == m.u[2] + m.touch[t].friction)
+    m.way = pyo.Constraint(m.i, m.t, rule=lambda m, i, t: m.dq[i, t] == m.v[i, t])
+    m.cost = pyo.Objective(expr=sum(m.q[i, 3] + m.u[i] ** 2 for i in m.i))
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=ELEMENTS, ncp=2)
+    return m
+
+
 class Branch:
     """One branch, by the sides of contacts in elements and of impacts at boundaries."""
 
@@ -50,19 +66,22 @@ class Branch:
         self._names = [condition.source.name for condition in self.c.conditions]
         zero = np.zeros(self.c.pairs, dtype=int)
         for i, n in closed:
-            zero[self._of(f"cross['touch[{i}].touching',{n}]")] = H_ZERO
+            zero[self.of(f"cross['touch[{i}].touching',{n}]")] = H_ZERO
         for i, b in impacts:
-            zero[self._of(f"impact['touch[{i}]',{b},")] = H_ZERO
+            zero[self.of(f"impact['touch[{i}]',{b},")] = H_ZERO
+        self.settle(zero)
+
+    def settle(self, zero):
         self.zero = settle(self.c, self.sides, self.c.x0, zero)
 
-    def _of(self, name):
+    def of(self, name):
         found = [k for k, other in enumerate(self._names) if name in other]
         assert found, (name, self._names)
         return found
 
     def impacts(self, i):
         """The boundaries at which a contact has an impulse."""
-        return [b for b in range(1, ELEMENTS) if all(self.zero[self._of(f"impact['touch[{i}]',{b},")] == H_ZERO)]
+        return [b for b in range(1, ELEMENTS) if all(self.zero[self.of(f"impact['touch[{i}]',{b},")] == H_ZERO)]
 
     def bounds(self):
         """Bounds of the variables by name, and those of the rows by name."""
@@ -95,6 +114,17 @@ def test_an_impact_goes_on_through_bodies_that_touch():
     closed = [(1, n) for n in (1, 2, 3)] + [(2, 2), (2, 3)]
     assert Branch(row_of_bodies(2), closed, impacts=[(1, 1), (2, 1)]).impacts(1) == [1]
     assert Branch(row_of_bodies(2), closed, impacts=[(1, 2), (2, 1)]).impacts(1) == []
+
+
+@pytest.mark.parametrize('touched, is_free', [((2, 3), True), ((3,), False), ((1, 2, 3), False)])
+def test_bodies_that_must_not_slip_have_a_free_impulse_where_they_meet_and_stay(touched, is_free):
+    # the boundary is that between the elements 1 and 2
+    branch = Branch(body_that_must_not_slip(), closed=[], impacts=[])
+    zero = branch.zero.copy()
+    for n in touched:
+        zero[[*branch.of(f"cross['touch.touching',{n},"), *branch.of(f"cross['touch.sticking',{n},")]] = H_ZERO
+    branch.settle(zero)
+    assert all(branch.zero[branch.of("slip['touch.sticking',1]")] == H_ZERO) is is_free
 
 
 def test_in_flight_nothing_is_decided():
