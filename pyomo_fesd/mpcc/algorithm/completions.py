@@ -28,7 +28,7 @@ LOOSER = (1.0, 10.0)
 #: A further path is followed where the relaxations around the best point have an objective that is smaller by the first part, or
 #: the path before went astray: the second part of its relaxations did not reach their solutions, or one was infeasible.
 GAP, ASTRAY = 0.5, 0.5
-#: With more than this part of the pairs undecided a relaxation on the way names no branch.
+#: With more than this part of the pairs undecided a relaxation names no branch.
 UNDECIDED = 0.5
 #: Part of the time limit after which no further round begins: the best point is certified in the rest.
 SHARE = 0.6
@@ -87,7 +87,7 @@ class Completions:
         least = max(LAST, self._options.eps_final)
         while eps * ROUND_OFF >= least and not self._deadline.expired():
             is_last = eps * self._options.eps_factor * ROUND_OFF < least
-            relaxed = self._round(w, eps, self._names_a_branch if not is_last else None)
+            relaxed = self._round(w, eps, is_on_the_way=not is_last)
             solved.append(relaxed.solved)
             if relaxed.status in INFEASIBLE:
                 return solved, True
@@ -121,20 +121,25 @@ class Completions:
         return point is None or point.f - self._promise > GAP * abs(point.f)
 
     def _names_a_branch(self, relaxed):
-        """Whether a relaxation on the way is worth a branch: it is not infeasible, and most of its pairs are decided."""
+        """Whether a relaxation itself names a branch: it is not infeasible, and most of its pairs are decided."""
         undecided = np.count_nonzero(self._subsolves.sets(relaxed.w, self._subsolves.biactive(self._c.evaluate(relaxed.w))).gamma)
         return relaxed.status not in INFEASIBLE and undecided <= UNDECIDED * self._c.pairs
 
-    def _round(self, w, eps, is_worth=None):
-        """One relaxation from ``w``, and the branch of its completion if it ``is_worth`` that and not known; returns its result."""
+    def _round(self, w, eps, is_on_the_way=False):
+        """One relaxation from ``w``, and the branch of its completion, unless it is known; returns the relaxation's result.
+
+        Where a simulation does not reach the end, the sides after that are those of the relaxation: on the way to smaller eps it is
+        only worth a branch if it names one.
+        """
         self.run.eps = eps
         began = time.perf_counter()
         relaxed = self._subsolves.relax(self._form, w, eps, None, self._options.relaxation_iterations)
         self._subsolves.keep_least_infeasible(relaxed.w)
         if eps <= AROUND[0] * ROUND_OFF and self._subsolves.usable(relaxed):
             self._promise = self._c.evaluate(relaxed.w).f
-        if (is_worth is None or is_worth(relaxed)) and not self._is_known(relaxed):
-            self._explore(relaxed.w, max(LEAST_TIME, LONGER * (time.perf_counter() - began)))
+        if not self._is_known(relaxed):
+            seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
+            self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))
         self._after(self.run)
         return relaxed
 
@@ -145,21 +150,26 @@ class Completions:
         self._objectives += [f] if relaxed.solved else []
         return is_known
 
-    def _explore(self, w, seconds):
+    def _explore(self, w, seconds, to_the_end):
         """Solve the branch of the completion of ``w`` without guide bounds."""
         narrow = self._c.widen()
         try:
-            self._branch_of_completion(w, seconds)
+            self._branch_of_completion(w, seconds, to_the_end)
         finally:
             if narrow:
                 self._c.narrow()
 
-    def _branch_of_completion(self, w, seconds):
-        """Solve the branch that the completion of ``w`` names; where that stops on its way, the completion of its end once more."""
+    def _branch_of_completion(self, w, seconds, to_the_end=False):
+        """Solve the branch that the completion of ``w`` names; where that stops on its way, the completion of its end once more.
+
+        With ``to_the_end`` only a simulation that reaches the end names one.
+        """
         for _ in range(ATTEMPTS):
             completed, is_complete, note = self._complete(w, seconds)
             self._subsolves.note(note, completed)
             self._possible = self._possible or is_complete
+            if to_the_end and not is_complete:
+                return
             if is_complete:
                 self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
             result, equal = self._branches.solutions.beside(completed)

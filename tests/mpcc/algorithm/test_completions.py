@@ -129,8 +129,15 @@ def test_a_relaxation_whose_pairs_are_open_names_no_branch():
     result = p.subsolves.relax('scholtes', p.compiled.x0, 1.0, None, 100)
     assert not rounds._names_a_branch(replace(result, w=np.array(p.point(x=0.0, y=0.0))))
     assert rounds._names_a_branch(replace(result, w=np.array(p.point(x=1.0, y=0.0))))
-    rounds._round(p.compiled.x0, 1.0, lambda relaxed: False)
-    assert not asked
+    rounds._branch_of_completion(p.compiled.x0, 1.0, to_the_end=True)
+    assert p.run.point is not None, "the simulation has reached the end"
+
+
+def test_on_the_way_a_simulation_that_stops_needs_decided_pairs(monkeypatch):
+    p, rounds, asked = completions(lambda x: (0.3, False))
+    monkeypatch.setattr(rounds, '_names_a_branch', lambda relaxed: False)
+    rounds._down(p.compiled.x0, 1.0)
+    assert len(asked) == 4 and len(p.kinds('branch')) == 1, "the last one is a branch in any case"
 
 
 @pytest.mark.parametrize('part, follows', [(0.4, True), (0.6, False)])
