@@ -128,8 +128,8 @@ class Completions:
     def _round(self, w, eps, is_on_the_way=False):
         """One relaxation from ``w``, and the branch of its completion, unless it is known; returns the relaxation's result.
 
-        Where a simulation does not reach the end, the sides after that are those of the relaxation: on the way to smaller eps it is
-        only worth a branch if it names one.
+        Where a completion stops on its way, the other sides are those of the relaxation: on the way to smaller eps it is only worth
+        a branch if it names one.
         """
         self.run.eps = eps
         began = time.perf_counter()
@@ -162,7 +162,7 @@ class Completions:
     def _branch_of_completion(self, w, seconds, to_the_end=False):
         """Solve the branch that the completion of ``w`` names; where that stops on its way, the completion of its end once more.
 
-        With ``to_the_end`` only a simulation that reaches the end names one.
+        With ``to_the_end`` only one that is complete names a branch.
         """
         for _ in range(ATTEMPTS):
             completed, is_complete, note = self._complete(w, seconds)
