@@ -163,10 +163,14 @@ def test_the_lengths_have_guide_bounds():
 
 
 def put_on_a_slope(m):
-    """Add a body that touches a curved surface."""
+    """Add a body that touches a curved surface, along which it must not slip."""
+    m.along = pyo.Var(m.t, initialize=0)
+    m.dalong = dae.DerivativeVar(m.along, wrt=m.t)
     m.q, m.v = pyo.Var(m.t, initialize=0), pyo.Var(m.t, initialize=0)
     m.dq, m.dv = dae.DerivativeVar(m.q, wrt=m.t), dae.DerivativeVar(m.v, wrt=m.t)
-    m.slope = pyomo_fesd.contact(m.t, gap=lambda m, t: pyo.exp(m.q[t]) - 1)
+    m.slope = pyomo_fesd.contact(m.t, gap=lambda m, t: pyo.exp(m.q[t]) - 1, friction=0.5, slip=lambda m, t: m.along[t], sticks=True)
+    m.held = pyo.Constraint(m.t, rule=lambda m, t: m.dalong[t] == m.slope[t].friction)
+    m.along[m.t.first()].fix(0)
     m.way = pyo.Constraint(m.t, rule=lambda m, t: m.dq[t] == m.v[t])
     m.momentum = pyo.Constraint(m.t, rule=lambda m, t: m.dv[t] == pyo.exp(m.q[t]) * m.slope[t].normal - 1)
     m.q[m.t.first()].fix(0)
