@@ -105,7 +105,8 @@ class Shift:
             for component in (impacts.velocity, impacts.direction):
                 yield from _moved(component, 0, self._by, lambda index: None)
             if impacts.drift is not None:
-                yield from _moved(impacts.drift, 1, self._by, lambda index: 0.0)
+                for component in (impacts.drift, impacts.rate):
+                    yield from _moved(component, 1, self._by, lambda index: 0.0)
 
 
 def _moved(component, position, by, beyond) -> Iterator[tuple]:

@@ -44,11 +44,14 @@ from pyomo_fesd.core.grid import (
 from pyomo_fesd.core.held_controls import held_controls
 from pyomo_fesd.core.homotopy_hints import (
     BranchConstraint,
+    DriftSides,
     Filling,
     Follower,
     HomotopyHints,
+    ImpactSides,
     NeighbourBranch,
     Penalty,
+    StickingSides,
     all_hints,
     homotopy_hints,
 )

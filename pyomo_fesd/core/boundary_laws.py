@@ -32,6 +32,8 @@ class Impacts:
         Q: the part above 0 of gamma(v+), where e is not 0; without restitution it is ``above``
     parts : Constraint over (contact, boundary, number)
         the equations of these parts
+    room : Constraint over (contact, boundary)
+        what keeps N at 0 where the bodies meet
     impact : Complementarity over (contact, boundary, number)
         an impulse only where the gap is 0 and the law of restitution holds
     velocity : Var over (boundary, number)
@@ -58,6 +60,7 @@ class Impacts:
     below: Var
     leaving: Var
     parts: Constraint
+    room: Constraint
     impact: Complementarity
     velocity: Var
     balance: Constraint
@@ -71,6 +74,16 @@ class Impacts:
     def drift(self) -> Var | None:
         """mu of curved contacts."""
         return self.block.component('drift')
+
+    @property
+    def rate(self) -> Var | None:
+        """gamma of curved contacts at the collocation points."""
+        return self.block.component('rate')
+
+    @property
+    def rates(self) -> Constraint | None:
+        """The equations of gamma there."""
+        return self.block.component('rates')
 
     @property
     def closed(self) -> Constraint | None:
@@ -113,7 +126,6 @@ class Impacts:
         variables = [some[index] for some in (self.above, self.below, self.leaving) if index in some]
         for v in variables:
             v.set_value(0.0)
-        # at the first time the second row is no equation of these parts
         rates = [value(self.parts[(*index, k)].body) for k in range(1, len(variables))]
         N = max(0.0, *(-rate for rate in rates))
         for v, number in zip(variables, (rates[0] + N, N, rates[-1] + N)):

@@ -108,6 +108,81 @@ class Filling:
     amount: float
 
 
+@dataclass(frozen=True, eq=False)
+class ImpactSides:
+    """A contact at one boundary: its law of impact has sides that the forces and distances beside it decide.
+
+    Where bodies meet that touch from then on, the impulse is free, as N has no room.  Where they have touched before and nothing
+    else has an impact there, there is no impulse, and N follows from velocities that are 0 by themselves.  With the other sides, or
+    with the bounds of P and N, the same solutions have no interior.
+
+    Attributes
+    ----------
+    boundary : int
+    pairs : tuple of ComplementarityData
+        with the impulse as their first side; none at the first time
+    above, below : VarData
+        P and N
+    room : ConstraintData
+        the row that keeps N at 0 unless one of ``within`` is not 0
+    within : tuple of VarData
+    before : tuple of VarData
+        the distances in the element before; none where velocities need not be 0 at its end
+    """
+
+    boundary: int
+    pairs: tuple[ComplementarityData, ...]
+    above: VarData
+    below: VarData
+    room: ConstraintData
+    within: tuple[VarData, ...]
+    before: tuple[VarData, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class StickingSides:
+    """Bodies that must not slip, at one boundary: where they meet and touch from then on, their impulse is free (theory, eq. 24).
+
+    Without an impulse the bodies could only meet at no velocity: a branch without interior.
+
+    Attributes
+    ----------
+    pair : ComplementarityData
+        with the impulse as its first side, the slip velocity after it as the second one
+    meeting : tuple of VarData
+        the distance at the boundary and the forces before it
+    after : tuple of VarData
+        the distances in the element after
+    """
+
+    pair: ComplementarityData
+    meeting: tuple[VarData, ...]
+    after: tuple[VarData, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class DriftSides:
+    """The drift of a curved contact and its normal velocity at one point, one of which is 0 (theory, eq. 22).
+
+    A branch decides which one by the forces and distances of the element; the row that weighs both for the homotopy is as good as
+    singular where a force ends.
+
+    Attributes
+    ----------
+    drift, rate : VarData
+    row : ConstraintData
+        the weighted one
+    distances, forces : tuple of VarData
+        the rate is 0 where all distances are 0, the drift is 0 where all forces are
+    """
+
+    drift: VarData
+    rate: VarData
+    row: ConstraintData
+    distances: tuple[VarData, ...]
+    forces: tuple[VarData, ...]
+
+
 class HomotopyHints(AutoSlots.Mixin):
     """The hints on one block; ``mpec_hybrid`` without them solves the same problem, perhaps to a worse local solution.
 
@@ -124,6 +199,9 @@ class HomotopyHints(AutoSlots.Mixin):
     chains : list of tuple of Part (``parts``)
     followers : list of Follower
     fillings : list of Filling
+    impacts : list of ImpactSides
+    stickings : list of StickingSides
+    drifts : list of DriftSides
     alike : list of tuples of VarData
         variables that are the same quantity at different places, and have one size
     """
@@ -138,6 +216,9 @@ class HomotopyHints(AutoSlots.Mixin):
         'chains',
         'followers',
         'fillings',
+        'impacts',
+        'stickings',
+        'drifts',
         'alike',
     )
 
@@ -152,6 +233,9 @@ class HomotopyHints(AutoSlots.Mixin):
         self.alike = []
         self.followers = []
         self.fillings = []
+        self.impacts = []
+        self.stickings = []
+        self.drifts = []
 
 
 Block.register_private_data_initializer(HomotopyHints, scope=SCOPE)
@@ -205,4 +289,7 @@ def all_hints(model: Block) -> HomotopyHints:
         total.alike += hints.alike
         total.followers += hints.followers
         total.fillings += hints.fillings
+        total.impacts += hints.impacts
+        total.stickings += hints.stickings
+        total.drifts += hints.drifts
     return total

@@ -74,8 +74,8 @@ class Contact:
         the block that ``contact`` made
     gap : ExpressionData
         the distance, never negative
-    distance : ExpressionData or VarData
-        the gap in the condition of contact: itself, or a variable that equals it
+    distance : VarData
+        the variable >= 0 that equals the gap
     forces : tuple of VarData
         the contact force, or those along the two edges of the friction cone: 0 <= their sum perp distance >= 0
     touching : ComplementarityData

@@ -25,8 +25,9 @@ from pyomo_fesd.results import SwitchingFunction, jumps_that_happen, largest_val
 
 #: A function below this part of its largest value is zero all along an element.
 ZERO = 1e-7
-#: A missed crossing counts if it is larger than this part of the function's largest value in the element.
-SIGNIFICANT = 1e-6
+#: A missed crossing counts if it is larger than this part of the function's largest value in the element; for gaps the second one,
+#: as those of bodies that part without a velocity are as small as the error of a long element.
+SIGNIFICANT, PENETRATION = 1e-6, 1e-2
 #: A slide ends smoothly if its multiplier arrives within this distance of its value in the next element.
 ARRIVED = 1e-2
 #: Relative times at which a function is evaluated, and those between them at which its interpolant is.
@@ -76,6 +77,8 @@ class _Kept:
         the multiplier of a switching function
     before : float
         its largest value in elements before those on the grid
+    is_gap : bool
+        whether it is the gap of a contact, which has no slope where a force ends
     """
 
     name: str
@@ -84,6 +87,7 @@ class _Kept:
     sign: Callable
     nu: dict | None = None
     before: float = 0.0
+    is_gap: bool = False
 
     @cached_property
     def largest(self):
@@ -96,11 +100,13 @@ class _Kept:
         return ZERO * self.largest
 
     def leaves_smoothly(self, element, grid):
-        """Whether a slide ends at the left boundary of ``element`` and its multiplier arrives there."""
+        """Whether a slide ends at the left boundary of ``element`` and its multiplier arrives there, or bodies part."""
         first = grid.elements[0]
-        if self.nu is None or element is first:
+        if (self.nu is None and not self.is_gap) or element is first:
             return False
         before = grid.elements[element.n - first.n - 1]
+        if self.is_gap:
+            return not self.sign(self, before)
         if self.sign(self, before) or any(t not in self.nu for t in (*before.points, element.points[0])):
             return False
         weights = interpolation_weights(grid.tau, np.ones(len(grid.tau)))
@@ -109,7 +115,7 @@ class _Kept:
 
 
 def _kept(moving, functions):
-    """Switching functions, conditions of modes with hysteresis, and guards."""
+    """Switching functions, conditions of modes with hysteresis, guards, and gaps of contacts."""
     for s in functions:
         yield _Kept(s.name, s.c, s.values, _sign, s.nu)
     for mode in [] if moving.hysteresis is None else moving.hysteresis.modes:
@@ -119,6 +125,9 @@ def _kept(moving, functions):
             yield _Kept(mode.title, by_label, _numbers(by_label), sign)
     for jump in [] if moving.state_jumps is None else moving.state_jumps.laws:
         yield _Kept(jump.name, jump.guards, _numbers(jump.guards), lambda _, element: 1)
+    impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
+    for law in [] if impacts is None else impacts.laws:
+        yield _Kept(law.name, law.gaps, _numbers(law.gaps), _sign_of_gap, is_gap=True)
 
 
 def _numbers(by_label):
@@ -136,6 +145,11 @@ def _sign(kept, element):
     return 0 if abs(largest) <= kept.zero else int(np.sign(largest))
 
 
+def _sign_of_gap(kept, element):
+    """1 where the bodies are apart, 0 where they touch all along an element."""
+    return int(any(kept.numbers[t] > kept.zero for t in element.points if t in kept.numbers))
+
+
 def _crossing(kept, element, grid, after):
     """The element and the relative time at which sign c is clearly negative inside it; None if it is not."""
     labels, sign = (element.left, *element.points), kept.sign(kept, element)
@@ -151,8 +165,8 @@ def _crossing(kept, element, grid, after):
     values = sign * _interpolation(NODES, INSIDE) @ at_nodes
     if kept.leaves_smoothly(element, grid):
         values = np.where(np.logical_or.accumulate(values >= 0), values, 0.0)
-    worst = int(np.argmin(values))
-    return (element, INSIDE[worst]) if values[worst] < -SIGNIFICANT * max(largest, np.abs(values).max()) else None
+    worst, part = int(np.argmin(values)), PENETRATION if kept.is_gap else SIGNIFICANT
+    return (element, INSIDE[worst]) if values[worst] < -part * max(largest, np.abs(values).max()) else None
 
 
 def _interpolated_between_points(functions, tau, after):

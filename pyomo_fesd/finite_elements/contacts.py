@@ -67,11 +67,12 @@ def declare_impacts(moving: MovingGrid, laws: list[ContactLaw], block: Block) ->
     )
     block.velocity = Var(block.left, block.coupled, dense=False)
     block.balance, block.parts = Constraint(block.left, block.coupled), Constraint(block.contact, block.left, [1, 2])
+    block.room = Constraint(block.contact, block.left)
     block.impact = Complementarity(block.contact, block.left, [1, 2])
     block.direction, block.weights = Var(block.left, block.coupled, dense=False), Constraint(block.left, block.coupled)
     block.slipping = Set(dimen=1)
     block.slip = Complementarity(block.slipping, block.left)
-    kept = (block.impulse, block.second, block.above, block.below, block.leaving, block.parts, block.impact)
+    kept = (block.impulse, block.second, block.above, block.below, block.leaving, block.parts, block.room, block.impact)
     return Impacts(laws, block, *kept, block.velocity, block.balance, block.direction, block.weights, block.slip, {}, {})
 
 

@@ -1,20 +1,20 @@
 """Contacts on curved surfaces: drifts of the positions, with which velocities keep the order of the scheme (theory, eq. 22).
 
 Takes: contacts whose gap is nonlinear in the positions.
-Leaves: ``drift`` (mu) and ``closed`` by contact, element and point on the block of the state jumps, and mu in the collocation
-equations of the positions.
+Leaves: ``drift`` (mu), ``rate`` (gamma) with its equation ``rates``, and ``closed`` by contact, element and point on the block of
+the state jumps, and mu in the collocation equations of the positions.
 Does not apply: where the gap is linear, as the normal velocity is 0 by itself.
 """
 
 from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, Constraint, Set, Var, quicksum
-from pyomo.core.expr.visitor import identify_variables, replace_expressions
+from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import MovingGrid, TimeIndex, is_discretisation_equation
+from pyomo_fesd.core import DriftSides, MovingGrid, TimeIndex, homotopy_hints, is_discretisation_equation, without_unit
 from pyomo_fesd.finite_elements.impulse_balance import BoundaryEquations
 
 #: Keeps the drift 0 where gap and force are both 0.
-NOWHERE = 1e-12
+NOWHERE = 1e-25
 
 
 def stabilise(moving: MovingGrid) -> None:
@@ -29,12 +29,13 @@ def stabilise(moving: MovingGrid) -> None:
     block, times = impacts.block, TimeIndex(moving.wrt)
     block.point = Set(initialize=range(1, len(moving.grid.tau) + 1))
     block.drift = Var(block.contact, moving.block.element, block.point, initialize=0, dense=False)
-    block.closed = Constraint(block.contact, moving.block.element, block.point)
+    block.rate = Var(block.contact, moving.block.element, block.point, initialize=0, dense=False)
+    block.rates, block.closed = (Constraint(block.contact, moving.block.element, block.point) for _ in range(2))
     equations = BoundaryEquations(block.model(), times, {t for e in moving.grid.elements for t in e.points})
     shifts = {}
     for law in curved:
         for element in moving.grid.elements:
-            _stabilise_element(block, law, element, equations, shifts)
+            _stabilise_element(moving, block, law, element, equations, shifts)
     _shift_positions(block.model(), shifts)
 
 
@@ -43,20 +44,27 @@ def _is_curved(law):
     return any(gap.polynomial_degree() not in (0, 1) for gap in law.gaps.values())
 
 
-def _stabilise_element(block, law, element, equations, shifts):
-    gap = quicksum(law.distances[t] for t in dict.fromkeys((element.left, *element.points)))
-    force = quicksum(force for t in element.points for force in law.forces[t])
+def _stabilise_element(moving, block, law, element, equations, shifts):
+    distances = tuple(law.distances[t] for t in dict.fromkeys((element.left, *element.points)))
+    forces = tuple(force for t in element.points for force in law.forces[t])
+    gap, force = quicksum(distances), quicksum(forces)
     for r, t in enumerate(element.points, start=1):
-        drift = block.drift[law.name, element.n, r]
+        index = law.name, element.n, r
+        drift, rate = block.drift[index], block.rate[index]
         gamma = equations.normal_velocity(law.gaps[t], law.forces[t][0].parent_block(), ComponentSet())
         # the opposite sign of gamma would allow a drift that keeps the gap closed while the bodies approach, where both are small
-        block.closed.add((law.name, element.n, r), ((gap + NOWHERE) * drift - force * gamma) / (gap + force + NOWHERE) == 0)
+        block.rates.add(index, without_unit(gamma) == rate)
+        row = block.closed.add(index, ((gap + NOWHERE) * drift - force * rate) / (gap + force + NOWHERE) == 0)
+        homotopy_hints(block).drifts.append(DriftSides(drift, rate, row, distances, forces))
         for xdot, slope in equations.gradient(law.gaps[t]):
-            shifts[id(xdot)] = shifts.get(id(xdot), xdot) + slope * drift
+            shifts[id(xdot)] = shifts.get(id(xdot), 0) + slope * drift * moving.r[element.n]
 
 
 def _shift_positions(model, shifts):
-    """Add the drifts to the rates of the positions, in the discretisation equations only."""
+    """Add the drifts to the increments r xdot of the positions, so that they count in an element of no length too."""
     for equation in model.component_data_objects(Constraint, active=True, descend_into=Block):
-        if is_discretisation_equation(equation) and any(id(v) in shifts for v in identify_variables(equation.body)):
-            equation.set_value(replace_expressions(equation.expr, shifts))
+        if is_discretisation_equation(equation):
+            increment, others = equation.expr.args
+            for v in identify_variables(increment):
+                if id(v) in shifts:
+                    equation.set_value(increment + shifts[id(v)] == others)

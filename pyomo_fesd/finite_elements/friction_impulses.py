@@ -8,7 +8,7 @@ from pyomo.common.collections import ComponentSet
 from pyomo.core.expr.visitor import identify_variables, replace_expressions
 from pyomo.mpec import complements
 
-from pyomo_fesd.core import FesdError, MovingGrid
+from pyomo_fesd.core import FesdError, MovingGrid, StickingSides, homotopy_hints
 from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
 
 
@@ -32,7 +32,8 @@ def add_friction_impulses(moving: MovingGrid, conditions: list[TimeComplementari
                 _add_pair(impacts, condition, element, replace_expressions(pair[0], swap))
                 found.update(own)
         for law, condition in _sticking(impacts, conditions, element.left):
-            _add_pair(impacts, condition, element, impacts.normal_impulse(law.name, b) / element.length)
+            pair = _add_pair(impacts, condition, element, impacts.normal_impulse(law.name, b) / element.length)
+            homotopy_hints(moving.block).stickings.append(_sides(moving, law, element, pair))
         other = next((nu for nu in directions if nu not in found), None)
         if other is not None:
             raise FesdError(
@@ -46,7 +47,15 @@ def _add_pair(impacts, condition, element, impulse):
     """An impulse only where the second side of a condition is 0 after the impact."""
     after = condition.starts.get(element.n, condition.sides[element.left])[1]
     impacts.block.slipping.add(condition.name)
-    impacts.slip.add((condition.name, element.n - 1), complements(impulse >= 0, after >= 0))
+    return impacts.slip.add((condition.name, element.n - 1), complements(impulse >= 0, after >= 0))
+
+
+def _sides(moving, law, element, pair):
+    """The hint for the pair of bodies that must not slip."""
+    before = moving.grid.elements[element.n - 2]
+    forces = (force for t in before.points for force in law.forces[t])
+    meeting = (law.distances[element.left], *forces)
+    return StickingSides(pair, meeting, tuple(law.distances[t] for t in element.points))
 
 
 def _sticking(impacts, conditions, label):

@@ -4,13 +4,12 @@ At boundary b between elements n and n + 1, with the normal velocity gamma = d g
 
     M (v+ - v-) = J^T Lambda                                                                            (20)
     gamma(v+) + e gamma(v-) = P - N,      0 <= Lambda perp P + N >= 0,
-    0 <= Lambda perp gap(q_b) - sigma h_{n+1} N >= 0,      P, N >= 0                                    (21)
-    0 <= sum_r normal_{n+1,r}  perp  Q + gap(q_b) + sum_r gap_{n+1,r} >= 0,      gamma(v+) <= Q
+    0 <= Lambda perp d_b >= 0,      d_b >= sigma h_{n+1} N,      d = gap(q),      P, N >= 0               (21)
+    0 <= sum_r normal_{n+1,r}  perp  Q + d_b + sum_r d_{n+1,r} >= 0,      gamma(v+) <= Q
 
-so an impulse acts only where the gap is 0, and then reverses the normal velocity by e.  The gap less sigma h N, sigma = 1/100,
-is what (21) has in place of the gap: where the gap is 0, N = 0, so without an impulse the bodies must not approach; in front of
-a wall N is free.  (With the gap alone, a body could enter a resting contact with a velocity that the first contact forces take
-away.)
+so an impulse acts only where the gap is 0, and then reverses the normal velocity by e.  The row of N, sigma = 1/100: where the gap
+is 0, N = 0, so without an impulse the bodies must not approach; in front of a wall N is free.  (Without it, a body could enter a
+resting contact with a velocity that the first contact forces take away.)
 
 Takes: the ``Impacts`` of ``contacts``, and the balances of momentum (``impulse_balance``).
 Leaves: their data at each boundary; velocities after impacts among ``after`` of the state jumps.
@@ -22,7 +21,7 @@ from pyomo.core import quicksum
 from pyomo.core.expr.visitor import identify_variables, replace_expressions
 from pyomo.mpec import complements
 
-from pyomo_fesd.core import FesdError, MovingGrid, TimeIndex, value_or_nan
+from pyomo_fesd.core import FesdError, ImpactSides, MovingGrid, TimeIndex, homotopy_hints, value_or_nan
 from pyomo_fesd.finite_elements.impulse_balance import BoundaryEquations
 
 #: sigma: bodies that would meet before this part of an element are in contact.
@@ -65,7 +64,8 @@ def _write_boundary(moving, equations, element):
     for law in laws:
         gamma = equations.normal_velocity(law.gaps[label], law.forces[label][0].parent_block(), moving_states)
         _add_parts(impacts, law, b, gamma, replace_expressions(gamma, {id(v): new for v, new in after.items()}))
-        (_add_sticking_pairs if law.sticking else _add_pairs)(moving, law, element)
+        _add_pairs(moving, law, element)
+        _add_room(moving, law, element, gamma)
         if not b:
             _check_start(law, label, gamma)
 
@@ -137,29 +137,31 @@ def _is_zero(restitution):
 
 def _add_pairs(moving, law, element):
     impacts, b = moving.state_jumps.impacts, element.n - 1
-    P, N = impacts.above[law.name, b], impacts.below[law.name, b]
-    distance = law.gaps[element.left] - AHEAD * moving.duration(element) * N
     if b:
-        impulse = impacts.impulse[law.name, b]
-        impacts.impact.add((law.name, b, 1), complements(impulse >= 0, distance >= 0))
-        impacts.impact.add((law.name, b, 2), complements(impulse >= 0, P + N >= 0))
-    else:
-        impacts.parts.add((law.name, b, 2), distance >= 0)
+        impulse, moved = impacts.normal_impulse(law.name, b), impacts.above[law.name, b] + impacts.below[law.name, b]
+        if law.sticking:
+            # a force that gives the impulse within an element: both are relaxed alike
+            impulse = impulse / element.length
+        impacts.impact.add((law.name, b, 1), complements(impulse >= 0, law.distances[element.left] >= 0))
+        impacts.impact.add((law.name, b, 2), complements(impulse >= 0, moved >= 0))
 
 
-def _add_sticking_pairs(moving, law, element):
-    """(24): without restitution; N is free after an element that is closed, where the velocity is 0 by itself."""
+def _add_room(moving, law, element, gamma):
+    """What keeps N at 0; N is free after an element that is closed, where the velocity is 0 by itself."""
     impacts, b, distance = moving.state_jumps.impacts, element.n - 1, law.distances[element.left]
+    if not b and _is_fixed(law.gaps[element.left]) and _is_fixed(gamma):
+        return
+    before = moving.grid.elements[b - 1] if b else None
+    forces = [force for t in before.points for force in law.forces[t]] if b else []
+    # with Legendre's points the velocity at the end of a closed element on a curve is not 0 by itself
+    ends = b and moving.grid.right_is_collocated
+    distances = tuple(law.distances[t] for t in dict.fromkeys((before.left, *before.points))) if ends else ()
     P, N = impacts.above[law.name, b], impacts.below[law.name, b]
-    room = distance - AHEAD * moving.duration(element) * N
-    if b:
-        # a force that gives the impulse within an element: both are relaxed alike
-        force = impacts.normal_impulse(law.name, b) / element.length
-        impacts.impact.add((law.name, b, 1), complements(force >= 0, distance >= 0))
-        impacts.impact.add((law.name, b, 2), complements(force >= 0, P + N >= 0))
-        room += quicksum(force for t in moving.grid.elements[b - 1].points for force in law.forces[t])
-    if b or not _is_fixed(law.gaps[element.left]):
-        impacts.parts.add((law.name, b, 2), room >= 0)
+    # with the forces N is free in a relaxation too
+    room = quicksum([distance, *forces]) if law.sticking else distance
+    row = impacts.room.add((law.name, b), room - AHEAD * moving.duration(element) * N >= 0)
+    pairs = tuple(impacts.impact[law.name, b, k] for k in (1, 2) if b)
+    homotopy_hints(moving.block).impacts.append(ImpactSides(b, pairs, P, N, row, (distance, *forces), distances))
 
 
 def _is_fixed(expr):

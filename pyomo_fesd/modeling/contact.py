@@ -11,7 +11,8 @@ from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import ContinuousSet
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import Contact, FesdError, switched_systems
+from pyomo_fesd.core import GENERATED, Contact, FesdError, switched_systems
+from pyomo_fesd.modeling.distance import add_distance
 from pyomo_fesd.modeling.friction import add_friction
 from pyomo_fesd.modeling.rules import refuse_wrong_rules, whole_or_none
 from pyomo_fesd.modeling.sticking_contact import add_sticking_contact
@@ -81,8 +82,11 @@ def contact(*sets, gap, restitution=0, friction=None, slip=None, directions: int
             switched_systems(block).contacts.append(add_sticking_contact(block, slip(parent, *index), mu))
             return
         block.normal = Var(bounds=(0, None), initialize=0)
-        block.touching = Complementarity(expr=complements(block.normal >= 0, block.gap >= 0))
-        switched_systems(block).contacts.append(Contact(block, block.gap, block.gap, (block.normal,), block.touching, e))
+        law = Block()
+        block.add_component(GENERATED + 'contact', law)
+        add_distance(law, block.gap)
+        block.touching = Complementarity(expr=complements(block.normal >= 0, law.d >= 0))
+        switched_systems(block).contacts.append(Contact(block, block.gap, law.d, (block.normal,), block.touching, e))
         if friction is not None:
             add_friction(block, 'friction', slip(parent, *index), mu * block.normal, directions, time)
 

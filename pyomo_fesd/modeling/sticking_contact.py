@@ -16,7 +16,8 @@ from pyomo.core import Block, Constraint, Expression, Var
 from pyomo.core.base.block import BlockData
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import GENERATED, Contact, Dependents, FesdError, switched_systems, value_or_zero, without_unit
+from pyomo_fesd.core import GENERATED, Contact, FesdError, switched_systems, without_unit
+from pyomo_fesd.modeling.distance import add_distance, add_part
 
 
 def add_sticking_contact(block: BlockData, slip, mu) -> Contact:
@@ -28,31 +29,12 @@ def add_sticking_contact(block: BlockData, slip, mu) -> Contact:
     law.forward, law.backward = Var(bounds=(0, None), initialize=0), Var(bounds=(0, None), initialize=0)
     block.normal = Expression(expr=law.forward + law.backward)
     block.friction = Expression(expr=mu * (law.forward - law.backward))
-    _add_part(law, 'd', block.gap, 1)
-    _add_part(law, 'p', slip, 1)
-    _add_part(law, 'n', slip, -1)
-    law.distance = Constraint(expr=without_unit(block.gap) == law.d)
+    add_distance(law, block.gap)
+    add_part(law, 'p', slip, 1)
+    add_part(law, 'n', slip, -1)
     law.slips = Constraint(expr=without_unit(slip) == law.p - law.n)
     systems = switched_systems(law)
-    systems.continuous[law.d] = law.distance
     systems.continuous[law.p] = systems.continuous[law.n] = law.slips
     block.touching = Complementarity(expr=complements(block.normal >= 0, law.d >= 0))
     law.sticking = Complementarity(expr=complements(block.normal >= 0, law.p + law.n >= 0))
     return Contact(block, block.gap, law.d, (law.forward, law.backward), block.touching, 0, law.sticking)
-
-
-def _add_part(law, name, expr, sign):
-    """A variable >= 0 that starts at the positive part of ``sign * expr``."""
-    part = Var(bounds=(0, None), initialize=max(0.0, sign * float(value_or_zero(expr))))
-    law.add_component(name, part)
-    switched_systems(law).dependents.append(Dependents((part,), (expr,), _Part(sign)))
-
-
-class _Part:
-    """The positive part of ``sign`` times an argument; a class, as models are copied and pickled."""
-
-    def __init__(self, sign):
-        self._sign = sign
-
-    def __call__(self, arguments):
-        return [max(0.0, self._sign * arguments[0])]

@@ -87,9 +87,9 @@ class EquationReader:
                 self._copies_of[n + later].append(v)
         impacts = None if self._moving.state_jumps is None else self._moving.state_jumps.impacts
         if impacts is not None and impacts.drift is not None:
-            for (_, n, _), v in impacts.drift.items():
+            for (_, n, _), v in chain(impacts.drift.items(), impacts.rate.items()):
                 self._copies_of[n].append(v)
-            for (_, n, _), c in impacts.closed.items():
+            for (_, n, _), c in chain(impacts.rates.items(), impacts.closed.items()):
                 self._rows_of[n].append(c)
 
     def _read_grid_rows(self):

@@ -162,6 +162,21 @@ def test_the_lengths_have_guide_bounds():
     assert bounds == (0.75, 1.25)
 
 
+def put_on_a_slope(m):
+    """Add a body that touches a curved surface, along which it must not slip."""
+    m.along = pyo.Var(m.t, initialize=0)
+    m.dalong = dae.DerivativeVar(m.along, wrt=m.t)
+    m.q, m.v = pyo.Var(m.t, initialize=0), pyo.Var(m.t, initialize=0)
+    m.dq, m.dv = dae.DerivativeVar(m.q, wrt=m.t), dae.DerivativeVar(m.v, wrt=m.t)
+    m.slope = pyomo_fesd.contact(m.t, gap=lambda m, t: pyo.exp(m.q[t]) - 1, friction=0.5, slip=lambda m, t: m.along[t], sticks=True)
+    m.held = pyo.Constraint(m.t, rule=lambda m, t: m.dalong[t] == m.slope[t].friction)
+    m.along[m.t.first()].fix(0)
+    m.way = pyo.Constraint(m.t, rule=lambda m, t: m.dq[t] == m.v[t])
+    m.momentum = pyo.Constraint(m.t, rule=lambda m, t: m.dv[t] == pyo.exp(m.q[t]) * m.slope[t].normal - 1)
+    m.q[m.t.first()].fix(0)
+    m.v[m.t.first()].fix(0)
+
+
 @pytest.mark.parametrize('way', ['clone', 'deepcopy'])
 def test_a_copy_of_a_discretised_model_has_hints_of_its_own(way):
     m = carried.build_with_jump(2 / 3)
@@ -171,6 +186,7 @@ def test_a_copy_of_a_discretised_model_has_hints_of_its_own(way):
     m.rise = dae.DerivativeVar(m.level)
     m.level[0].fix(0)
     m.ramp = pyo.Constraint(m.t, rule=lambda m, t: m.rise[t] == 1)
+    put_on_a_slope(m)
     move(dcs(m), 4, 2)
     m.measured = pyo.Constraint(expr=pyomo_fesd.at(m.level, 0.3) <= 1)
     other = COPIES[way](m)
@@ -186,4 +202,10 @@ def test_a_copy_of_a_discretised_model_has_hints_of_its_own(way):
             assert v.model() is other
     for follower in theirs.followers:
         assert follower.pair.model() is other and follower.leader.model() is other
+    for impact in theirs.impacts:
+        components = (*impact.pairs, impact.above, impact.below, impact.room, *impact.within, *impact.before)
+        assert all(component.model() is other for component in components)
+    for drift in theirs.drifts:
+        components = (drift.drift, drift.rate, drift.row, *drift.distances, *drift.forces)
+        assert all(component.model() is other for component in components)
     assert all(v.model() is other for v in theirs.guide_bounds)

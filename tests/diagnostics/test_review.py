@@ -229,6 +229,38 @@ def test_a_guard():
     assert [w.split(':')[0] for w in solved(move(m, 1, 3))] == ['impact']
 
 
+def falling(q, v, force, end, restitution=0):
+    """A body above the ground: q' = v, v' = force(t) + N."""
+    m = over_time(end, q=q, v=v, c=0)
+    m.clock = pyo.Constraint(m.t, rule=lambda m, t: m.dc[t] == 1)
+    m.touch = pyomo_fesd.contact(m.t, gap=lambda m, t: m.q[t], restitution=restitution)
+    m.kinematics = pyo.Constraint(m.t, rule=lambda m, t: m.dq[t] == m.v[t])
+    m.momentum = pyo.Constraint(m.t, rule=lambda m, t: m.dv[t] == force(m.c[t]) + m.touch[t].normal)
+    return m
+
+
+def test_bodies_that_go_through_one_another_between_two_points():
+    m = move(falling(1.9, -2, lambda c: 1, 4), 1, 3)
+    assert [w.split(' ')[:3] for w in solved(m)] == [['touch:', 'near', 'time']]
+
+
+@pytest.mark.parametrize('scheme', SCHEMES)
+@pytest.mark.parametrize(
+    'q, v, force, restitution',
+    [
+        (0.5, 0, lambda c: -2, 0),
+        (0.5, 0, lambda c: -2, 0.8),
+        (0, 0, lambda c: pyo.exp(c - 1) - 1, 0),
+        (0, 0, lambda c: pyo.sin(5 * c) - 1, 0),
+    ],
+    ids=['stays', 'bounces', 'leaves', 'leaves and lands'],
+)
+def test_contacts_are_not_warned_of(q, v, force, restitution, scheme):
+    m = move(falling(q, v, force, 2, restitution), 12, 2, scheme=scheme)
+    pyomo_fesd.simulate(m)
+    assert diagnose(m) == []
+
+
 # Good solutions
 
 

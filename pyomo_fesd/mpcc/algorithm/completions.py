@@ -20,9 +20,16 @@ from pyomo_fesd.mpcc.subproblems import Stationarity
 LAST, AROUND = 1e-3, (1e-1, 1e-2)
 #: Times that relaxations go around the best point at most, and the part by which its objective must fall to go on.
 CYCLES, PROGRESS = 6, 1e-3
-#: First eps of a second path, relative to that of the first; it is followed where the relaxations around the best point have an
-#: objective that is smaller by the second part, or the third part of the first path's relaxations did not reach their solutions.
-LOOSER, GAP, ASTRAY = 10.0, 0.5, 0.5
+#: option ``relaxation`` -> paths: the form of their relaxations, and their first eps relative to the option ``eps_init``.  Bounds
+#: of products may lead to a local minimum of the violation, and penalties to where nothing touches: each form finds what the other
+#: one misses.
+PATHS = {'auto': (('scholtes', 1.0), ('elastic', 1.0))}
+LOOSER = (1.0, 10.0)
+#: A further path is followed where the relaxations around the best point have an objective that is smaller by the first part, or
+#: the path before went astray: the second part of its relaxations did not reach their solutions, or one was infeasible.
+GAP, ASTRAY = 0.5, 0.5
+#: With more than this part of the pairs undecided a relaxation names no branch.
+UNDECIDED = 0.5
 #: Part of the time limit after which no further round begins: the best point is certified in the rest.
 SHARE = 0.6
 #: A completion may take this many times as long as the relaxation before, and at least these seconds.
@@ -49,51 +56,61 @@ class Completions:
     def __init__(self, setup, subsolves, branches):
         self._c, self._options, self._complete, self._after = setup.compiled, setup.options, setup.complete, setup.after
         self._subsolves, self._branches, self.run = subsolves, branches, subsolves.run
-        self._form = 'scholtes' if self._options.relaxation == 'auto' else self._options.relaxation
+        form = self._options.relaxation
+        self._paths = PATHS.get(form) or tuple((form, looser) for looser in LOOSER)
+        self._form = self._paths[0][0]
         self._deadline, self._promise, self._possible = setup.deadline.part(SHARE), -np.inf, False
-        self._objectives, self._around = [], set()
+        self._objectives, self._around, self._best = [], set(), None
 
     def follow(self, start):
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
-        for eps in (self._options.eps_init, self._options.eps_init * LOOSER):
-            is_astray = self._down(start, eps)
+        for form, looser in self._paths:
+            self._form, self._best = form, None
+            solved, is_infeasible = self._down(start, self._options.eps_init * looser)
+            if is_infeasible and (form, looser) != self._paths[-1]:
+                # it led away from all solutions: the next path has more to go on from
+                continue
             self._improve()
+            is_astray = is_infeasible or solved.count(False) >= ASTRAY * len(solved)
             if not self._possible or not (is_astray or self._promising()) or self._deadline.expired():
                 break
         if self.run.point is not None:
             self._certify()
 
     def _down(self, w, eps):
-        """Rounds with ever smaller eps, each from the relaxation before; returns whether many did not reach their solutions.
+        """Rounds with ever smaller eps, each from the relaxation before.
 
-        The points of a relaxation with a smaller eps are among those of one before: after an infeasible one there is none.
+        Returns whether each reached its solution, and whether the last one ended as infeasible.  The points of a relaxation with a
+        smaller eps are among those of one before: after an infeasible one there is none.
         """
         solved = []
-        while eps * ROUND_OFF >= max(LAST, self._options.eps_final) and not self._deadline.expired():
-            relaxed = self._round(w, eps)
+        least = max(LAST, self._options.eps_final)
+        while eps * ROUND_OFF >= least and not self._deadline.expired():
+            is_last = eps * self._options.eps_factor * ROUND_OFF < least
+            relaxed = self._round(w, eps, is_on_the_way=not is_last)
             solved.append(relaxed.solved)
             if relaxed.status in INFEASIBLE:
-                break
+                return solved, True
             w = relaxed.w
             eps *= self._options.eps_factor
-        return solved.count(False) >= ASTRAY * len(solved)
+        return solved, False
 
     def _improve(self):
-        """Rounds around the best point, until they no longer find a much better one."""
+        """Rounds around the best point of the path, until they no longer find a much better one."""
         for _ in range(CYCLES):
-            before = self.run.point
+            before = self._best
             if before is None:
                 return
             for eps in AROUND:
                 if self._deadline.expired():
                     return
-                self._round_about(self.run.point.w, eps)
-            if not self.run.point.f < before.f - PROGRESS * max(1.0, abs(before.f)):
+                self._round_about(self._best.w, eps)
+            if not self._best.f < before.f - PROGRESS * max(1.0, abs(before.f)):
                 return
 
     def _round_about(self, w, eps):
         """A round from ``w``, unless it was run before: it starts cold, and would have the same end."""
-        key = eps, w.tobytes(), self._c.lbx.tobytes()
+        key = self._form, eps, w.tobytes(), self._c.lbx.tobytes()
         if key not in self._around:
             self._around.add(key)
             self._round(w, eps)
@@ -103,8 +120,17 @@ class Completions:
         point = self.run.point
         return point is None or point.f - self._promise > GAP * abs(point.f)
 
-    def _round(self, w, eps):
-        """One relaxation from ``w``, and the branch of its completion, unless it is known; returns the relaxation's result."""
+    def _names_a_branch(self, relaxed):
+        """Whether a relaxation itself names a branch: it is not infeasible, and most of its pairs are decided."""
+        undecided = np.count_nonzero(self._subsolves.sets(relaxed.w, self._subsolves.biactive(self._c.evaluate(relaxed.w))).gamma)
+        return relaxed.status not in INFEASIBLE and undecided <= UNDECIDED * self._c.pairs
+
+    def _round(self, w, eps, is_on_the_way=False):
+        """One relaxation from ``w``, and the branch of its completion, unless it is known; returns the relaxation's result.
+
+        Where a completion stops on its way, the other sides are those of the relaxation: on the way to smaller eps it is only worth
+        a branch if it names one.
+        """
         self.run.eps = eps
         began = time.perf_counter()
         relaxed = self._subsolves.relax(self._form, w, eps, None, self._options.relaxation_iterations)
@@ -112,7 +138,8 @@ class Completions:
         if eps <= AROUND[0] * ROUND_OFF and self._subsolves.usable(relaxed):
             self._promise = self._c.evaluate(relaxed.w).f
         if not self._is_known(relaxed):
-            self._explore(relaxed.w, max(LEAST_TIME, LONGER * (time.perf_counter() - began)))
+            seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
+            self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))
         self._after(self.run)
         return relaxed
 
@@ -123,21 +150,26 @@ class Completions:
         self._objectives += [f] if relaxed.solved else []
         return is_known
 
-    def _explore(self, w, seconds):
+    def _explore(self, w, seconds, to_the_end):
         """Solve the branch of the completion of ``w`` without guide bounds."""
         narrow = self._c.widen()
         try:
-            self._branch_of_completion(w, seconds)
+            self._branch_of_completion(w, seconds, to_the_end)
         finally:
             if narrow:
                 self._c.narrow()
 
-    def _branch_of_completion(self, w, seconds):
-        """Solve the branch that the completion of ``w`` names; where that stops on its way, the completion of its end once more."""
+    def _branch_of_completion(self, w, seconds, to_the_end=False):
+        """Solve the branch that the completion of ``w`` names; where that stops on its way, the completion of its end once more.
+
+        With ``to_the_end`` only one that is complete names a branch.
+        """
         for _ in range(ATTEMPTS):
             completed, is_complete, note = self._complete(w, seconds)
             self._subsolves.note(note, completed)
             self._possible = self._possible or is_complete
+            if to_the_end and not is_complete:
+                return
             if is_complete:
                 self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
             result, equal = self._branches.solutions.beside(completed)
@@ -148,13 +180,15 @@ class Completions:
             w = result.w
 
     def _keep(self, solved, equal=None):
-        """Keep a feasible point that is better than the best so far; its certificate comes at the end."""
-        f, best = self._c.evaluate(solved.w).f, self.run.point
-        if best is not None and f >= best.f:
+        """Keep a feasible point that is better than the best of the path, or of all; its certificate comes at the end."""
+        f = self._c.evaluate(solved.w).f
+        if self._best is not None and f >= self._best.f:
             return
         certificate = self._subsolves.measure(solved.w)
         if certificate.feasible:
-            self.run.point = Point(solved, f, replace(certificate, grade=Stationarity.UNTRIED), equal)
+            self._best = Point(solved, f, replace(certificate, grade=Stationarity.UNTRIED), equal)
+            if self.run.point is None or f < self.run.point.f:
+                self.run.point = self._best
 
     def _certify(self):
         """The certificate of the best point, and descent from it."""

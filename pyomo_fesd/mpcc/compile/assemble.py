@@ -15,9 +15,12 @@ from pyomo_fesd.mpcc.compile.arrival_indices import arrival_indices, changes_by_
 from pyomo_fesd.mpcc.compile.casadi_matrices import csr
 from pyomo_fesd.mpcc.compile.hint_indices import (
     CoincidenceIndices,
+    DriftIndices,
     FillingIndices,
     FollowerIndices,
+    ImpactIndices,
     NeighbourIndices,
+    StickingIndices,
 )
 from pyomo_fesd.mpcc.compile.model_values import ModelValues, start_values, stated_bounds
 from pyomo_fesd.mpcc.compile.mpcc_data import MpccData
@@ -141,6 +144,7 @@ class _Assembly:
         sign = -1.0 if problem.objective is not None and problem.objective.sense == maximize else 1.0
         positions = _positions_of(rows.conditions), {id(v): [j] for j, v in enumerate(self._variables)}
         changes = changes_by_id(hints, positions[0])
+        of_rows = {id(c): i for i, c in enumerate(self._constraints)}
         data = MpccData(
             lbg=rows.lbg * scale.g,
             ubg=rows.ubg * scale.g,
@@ -155,6 +159,9 @@ class _Assembly:
             parts=part_indices(hints.chains, positions[1]),
             followers=_followers(hints.followers, positions[0]),
             fillings=_fillings(hints.fillings, *positions, scale.x),
+            impacts=_impacts(hints.impacts, *positions, of_rows),
+            stickings=_stickings(hints.stickings, *positions),
+            drifts=_drifts(hints.drifts, positions[1], of_rows),
             **values.read(),
         )
         functions = self._scaled_functions(scale, sign)
@@ -237,6 +244,41 @@ def _fillings(fillings, pairs, columns, s_x):
         if len(of_pairs) == len(filling.pairs) and len(shares) == len(extents) == len(of_pairs) + 1:
             coefficients = np.array([coefficient for coefficient, _ in filling.extents]) / s_x[extents]
             found.append(FillingIndices(of_pairs, shares, s_x[shares], extents, coefficients, filling.amount))
+    return found
+
+
+def _impacts(impacts, pairs, columns, rows):
+    """The impacts by positions, without those of which something is not in the problem."""
+    found = []
+    for impact in impacts:
+        variables = (impact.above, impact.below, *impact.within, *impact.before)
+        if id(impact.room) in rows and all(id(v) in columns for v in variables):
+            above, below = (columns[id(v)][0] for v in (impact.above, impact.below))
+            within, before = (positions_of(some, columns) for some in (impact.within, impact.before))
+            of_pairs = positions_of(impact.pairs, pairs)
+            found.append(ImpactIndices(impact.boundary, of_pairs, above, below, rows[id(impact.room)], within, before))
+    return found
+
+
+def _stickings(stickings, pairs, columns):
+    """The boundaries of bodies that must not slip by positions, without those of which something is not in the problem."""
+    found = []
+    for sides in stickings:
+        if id(sides.pair) in pairs and all(id(v) in columns for v in (*sides.meeting, *sides.after)):
+            meeting, after = (positions_of(some, columns) for some in (sides.meeting, sides.after))
+            found.append(StickingIndices(pairs[id(sides.pair)][0], meeting, after))
+    return found
+
+
+def _drifts(drifts, columns, rows):
+    """The drifts by positions, without those of which something is not in the problem."""
+    found = []
+    for drift in drifts:
+        variables = (drift.drift, drift.rate, *drift.distances, *drift.forces)
+        if id(drift.row) in rows and all(id(v) in columns for v in variables):
+            of_drift, of_rate = (columns[id(v)][0] for v in (drift.drift, drift.rate))
+            sides = (positions_of(some, columns) for some in (drift.distances, drift.forces))
+            found.append(DriftIndices(of_drift, of_rate, rows[id(drift.row)], *sides))
     return found
 
 

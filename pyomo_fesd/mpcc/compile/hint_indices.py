@@ -168,6 +168,39 @@ class FollowerIndices:
 
 
 @dataclass(frozen=True, eq=False)
+class ImpactIndices:
+    """An ``ImpactSides`` by positions of pairs, variables and its row."""
+
+    boundary: int
+    pairs: np.ndarray
+    above: int
+    below: int
+    room: int
+    within: np.ndarray
+    before: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class StickingIndices:
+    """A ``StickingSides`` by positions of its pair and variables."""
+
+    pair: int
+    meeting: np.ndarray
+    after: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class DriftIndices:
+    """A ``DriftSides`` by positions of variables and of its row."""
+
+    drift: int
+    rate: int
+    row: int
+    distances: np.ndarray
+    forces: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class FillingIndices:
     """A ``Filling`` by positions of pairs and variables; ``coefficients`` are those of the scaled variables ``extents``.
 

@@ -28,6 +28,9 @@ class MpccData:
     parts : list of PartIndices
     followers : FollowerIndices
     fillings : list of FillingIndices
+    impacts : list of ImpactIndices
+    stickings : list of StickingIndices
+    drifts : list of DriftIndices
     tentative : bool array, decisions that are dropped where they leave no solution
     """
 
@@ -51,4 +54,7 @@ class MpccData:
     parts: list
     followers: object
     fillings: list
+    impacts: list
+    stickings: list
+    drifts: list
     tentative: np.ndarray

@@ -109,6 +109,16 @@ class MpccFunctions:
         """Mask over the sides (2q) that are not linear."""
         return self._functions.sides.functions.nonlinear[: 2 * self.pairs]
 
+    @cached_property
+    def single_rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """The linear equations that contain one variable only, and these variables."""
+        linear = ~self._functions.rows.functions.nonlinear[: len(self.lbg)]
+        rows = self.gradients(self.x0)[1]
+        single = np.flatnonzero(linear & (self.lbg == self.ubg) & (np.diff(rows.indptr) == 1))
+        columns = rows.indices[rows.indptr[single]]
+        has_slope = rows.data[rows.indptr[single]] != 0.0
+        return single[has_slope], columns[has_slope]
+
     def parameter_terms(self, w) -> np.ndarray:
         """Return the sizes of the terms of parameters in g and in the sides at ``w``."""
         if not self.p.numel():

@@ -16,8 +16,10 @@ from scipy import sparse
 
 from pyomo_fesd.mpcc.compile import Outer, composed, csr_pattern, take
 from pyomo_fesd.mpcc.subproblems.active_set import FREE
+from pyomo_fesd.mpcc.subproblems.impact_sides import give_interior
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, infeasible
 from pyomo_fesd.mpcc.subproblems.side_constraints import settle, with_shares
+from pyomo_fesd.mpcc.subproblems.single_rows import fix_single
 
 #: A branch starts near its solution: not so close to the bounds that Ipopt's steps are cut short, nor pushed far from them.  One
 #: that starts elsewhere is left to Ipopt's own centring.
@@ -123,6 +125,8 @@ class Branch:
             return None
         lbx, ubx = bounds
         lbg, ubg = self._row_bounds(zero, equal)
+        give_interior(c, zero, lbx, ubx, lbg, ubg)
+        fix_single(c, w, lbx, ubx, lbg, ubg)
         w = np.clip(w, lbx, ubx)
         if not self._drop_settled_rows(w, lbx == ubx, lbg, ubg, settled):
             return None

@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from pyomo_fesd.mpcc.compile import Outer, composed, take
+from pyomo_fesd.mpcc.subproblems.single_rows import fix_single
 
 
 @dataclass
@@ -107,12 +108,13 @@ class Relaxation:
     def solve(self, w, eps, duals=None, max_iter=None):
         """Solve from ``w``, with the multipliers of an earlier result of this form if given."""
         c = self._c
-        lbx, ubx = c.lbx, c.guide_ubx
+        lbx, ubx, lbg, ubg = c.lbx.copy(), c.guide_ubx.copy(), self._lbg.copy(), self._ubg.copy()
+        fix_single(c, w, lbx, ubx, lbg, ubg)
         if self._slack:
             at = c.evaluate(w)
             w = np.append(w, min(1.0, (at.G * at.H).max(initial=0.0) + ROOM))
             lbx, ubx = np.append(lbx, 0.0), np.append(ubx, np.inf)
-        result = self._nlp.solve(w, [eps, *c.parameters], lbx, ubx, self._lbg, self._ubg, duals, max_iter)
+        result = self._nlp.solve(w, [eps, *c.parameters], lbx, ubx, lbg, ubg, duals, max_iter)
         return result.shortened(len(c.x0))
 
 

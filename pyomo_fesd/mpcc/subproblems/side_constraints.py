@@ -13,6 +13,7 @@ from scipy import sparse
 
 from pyomo_fesd.mpcc.compile import major_index
 from pyomo_fesd.mpcc.subproblems.active_set import FREE, G_ZERO, H_ZERO
+from pyomo_fesd.mpcc.subproblems.impact_sides import with_impacts
 
 #: Agreement of a side's least value with 0.
 EXACT = 1e-12
@@ -62,7 +63,11 @@ class Sides:
 
     def bounds(self, zero, lbx, ubx):
         """Bounds of the variables (from ``lbx`` and ``ubx``) in the branch of an assignment; they may contradict each other."""
-        fixed, bound = self.variables(self.zero_rows(zero) & (self.row_of < 0))
+        return self.bounds_with(self.zero_rows(zero), lbx, ubx)
+
+    def bounds_with(self, given, lbx, ubx):
+        """Bounds of the variables with the sides in a mask (2q) at zero."""
+        fixed, bound = self.variables(given & (self.row_of < 0))
         lower, upper = fixed[bound == 1], fixed[bound == 2]
         low, high = lbx.copy(), ubx.copy()
         high[lower] = lbx[lower]
@@ -104,9 +109,9 @@ def sort_sides(c) -> Sides:
 def settle(c, sides, w, zero):
     """The assignment ``zero`` without sides that other pairs decide.
 
-    Followers get the sides of their leaders, fillings those that the extents in ``w`` show.  The bounds that a branch fixes may
-    make a side constant.  If that is zero, its pair holds, and a row for the other side would only take away room.  (Both sides of
-    such a pair are zero at many solutions, and round-off would choose.)
+    Followers get the sides of their leaders, fillings those that the extents in ``w`` show, impacts those that ``with_impacts``
+    gives them.  The bounds that a branch fixes may make a side constant.  If that is zero, its pair holds, and the other side would
+    only take away room.  (Both sides of such a pair are zero at many solutions, and round-off would choose.)
 
     Parameters
     ----------
@@ -115,17 +120,38 @@ def settle(c, sides, w, zero):
         values of the variables that the assignment does not fix
     zero : int array (q)
     """
-    zero = _filled(c.fillings, w, _follow(c.followers, zero))
-    lbx, ubx = sides.bounds(zero, c.lbx, c.ubx)
-    constant = sides.constant(lbx == ubx)
-    needs_row = sides.zero_rows(zero) & (sides.row_of >= 0)
-    if np.any(lbx > ubx) or not np.any(constant) or not np.any(needs_row):
+    zero = _without_superfluous(c, sides, w, _filled(c.fillings, w, _follow(c.followers, zero)))
+    if not c.impacts:
         return zero
-    at = c.evaluate(np.clip(w, lbx, ubx))
-    small = np.abs(np.concatenate([at.G, at.H])) <= SETTLED
-    other = np.roll(constant & small, len(zero))
-    changes = np.any((needs_row & ~constant & other).reshape(2, -1), axis=0)
-    return np.where(changes, 1 - zero, zero)
+    return _without_superfluous(c, sides, w, with_impacts(c, zero, sides.bounds(zero, c.lbx, c.ubx)[1]))
+
+
+def _without_superfluous(c, sides, w, zero):
+    """The assignment in which no pair has a side at zero that need not be, as the other one is a constant zero without it."""
+    given = sides.zero_rows(zero)
+    fixed, settled = _constant_zeros(c, sides, w, given)
+    if fixed is None or not np.any(settled):
+        return zero
+    superfluous = given & np.roll(settled, len(zero))
+    # a row fixes nothing, so that the others settle its pair in any case; bounds may be what settles it
+    rows = superfluous & (sides.row_of >= 0) & ~sides.constant(fixed)
+    bounds = superfluous & (sides.row_of < 0)
+    if np.any(bounds):
+        without, settled = _constant_zeros(c, sides, w, given & ~bounds)
+        bounds &= np.roll(settled, len(zero)) & ~sides.constant(without)
+    return np.where((rows | bounds).reshape(2, -1).any(axis=0), 1 - zero, zero)
+
+
+def _constant_zeros(c, sides, w, given):
+    """The variables (n) that sides at zero (mask over 2q) fix, None where these contradict; and the sides that are a zero then."""
+    lbx, ubx = sides.bounds_with(given, c.lbx, c.ubx)
+    if np.any(lbx > ubx):
+        return None, None
+    constant = sides.constant(lbx == ubx)
+    if np.any(constant):
+        at = c.evaluate(np.clip(w, lbx, ubx))
+        constant &= np.abs(np.concatenate([at.G, at.H])) <= SETTLED
+    return lbx == ubx, constant
 
 
 def _follow(followers, zero):

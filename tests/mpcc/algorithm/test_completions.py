@@ -92,6 +92,54 @@ def test_no_relaxation_follows_an_infeasible_one(monkeypatch):
     assert len(p.kinds('relaxation')) == 1
 
 
+def test_a_path_that_ends_infeasible_is_followed_by_one_of_the_other_form(monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    relax, forms = p.subsolves.relax, []
+
+    def infeasible_in_the_first_form(form, *args):
+        forms.append(form)
+        result = relax(form, *args)
+        return replace(result, status='Infeasible_Problem_Detected') if form == 'scholtes' else result
+
+    monkeypatch.setattr(p.subsolves, 'relax', infeasible_in_the_first_form)
+    rounds.follow(p.compiled.x0)
+    assert forms[0] == 'scholtes' and set(forms[1:]) == {'elastic'}, "and nothing looks around what the first path found"
+    assert p.run.point.certificate.grade is Stationarity.B
+
+
+def test_another_path_goes_around_its_own_points(monkeypatch):
+    # the first path has the better point, the branch of the second one is worse: relaxations begin there nevertheless
+    p, rounds, _ = completions(lambda x: (0.3 if rounds._form == 'scholtes' else 0.0, True))
+    relax, starts = p.subsolves.relax, []
+
+    def relaxed(form, w, *args):
+        starts.append((form, w))
+        result = relax(form, w, *args)
+        return replace(result, status='Infeasible_Problem_Detected') if form == 'scholtes' and len(starts) > 3 else result
+
+    monkeypatch.setattr(p.subsolves, 'relax', relaxed)
+    rounds.follow(p.compiled.x0)
+    assert p.run.point.f == pytest.approx(0.5)
+    around = [w for form, w in starts if form == 'elastic'][4]
+    assert p.compiled.evaluate(around).f == pytest.approx(1)
+
+
+def test_a_relaxation_whose_pairs_are_open_names_no_branch():
+    p, rounds, asked = completions(lambda x: (0.3, True))
+    result = p.subsolves.relax('scholtes', p.compiled.x0, 1.0, None, 100)
+    assert not rounds._names_a_branch(replace(result, w=np.array(p.point(x=0.0, y=0.0))))
+    assert rounds._names_a_branch(replace(result, w=np.array(p.point(x=1.0, y=0.0))))
+    rounds._branch_of_completion(p.compiled.x0, 1.0, to_the_end=True)
+    assert p.run.point is not None, "the simulation has reached the end"
+
+
+def test_on_the_way_a_simulation_that_stops_needs_decided_pairs(monkeypatch):
+    p, rounds, asked = completions(lambda x: (0.3, False))
+    monkeypatch.setattr(rounds, '_names_a_branch', lambda relaxed: False)
+    rounds._down(p.compiled.x0, 1.0)
+    assert len(asked) == 4 and len(p.kinds('branch')) == 1, "the last one is a branch in any case"
+
+
 @pytest.mark.parametrize('part, follows', [(0.4, True), (0.6, False)])
 def test_a_second_path_follows_where_relaxations_promise_less_than_half(part, follows):
     p, rounds, _ = completions(lambda x: (0.0, True))
@@ -111,7 +159,8 @@ def test_a_second_path_is_no_help_where_nothing_can_be_completed():
     p, rounds, asked = completions(lambda x: (0.0, False), lpec='reduced')
     p.subsolves.attempt = lambda *args, **more: None
     rounds.follow(p.compiled.x0)
-    assert p.run.point is None and len(asked) == 4
+    assert p.run.point is None and len(asked) > 0
+    assert len(p.kinds('relaxation')) == 4
 
 
 def test_a_completion_without_a_branch_is_judged_as_it_is():

@@ -125,3 +125,24 @@ def test_a_settled_branch_contains_the_branch(factors, choices):
     at = c.evaluate(w)
     new = settled != zero
     assert np.all(np.where(settled == G_ZERO, at.G, at.H)[new] == 0)
+
+
+@settings(deadline=None)
+@given(
+    terms=st.lists(st.sets(st.integers(0, 3), min_size=1, max_size=3), min_size=4, max_size=10),
+    choices=st.lists(st.sampled_from([G_ZERO, H_ZERO]), min_size=5, max_size=5),
+)
+def test_no_pair_takes_away_room_that_sums_of_others_have_settled(terms, choices):
+    """The sides are sums of variables >= 0: a settled branch fixes no more variables, and its pairs hold."""
+    m = pyo.ConcreteModel()
+    m.a, m.k = pyo.Var(range(4), bounds=(0, 1), initialize=0.3), pyo.RangeSet(len(terms) // 2)
+    m.pair = Complementarity(m.k, rule=lambda m, k: complements(*(sum(m.a[i] for i in terms[2 * k - s]) >= 0 for s in (2, 1))))
+    m.cost = pyo.Objective(expr=-sum(m.a.values()))
+    c, sides = compiled(m)
+    zero = np.array(choices[: c.pairs])
+    settled = settle(c, sides, c.x0, zero)
+    of_branch, of_settled = (sides.bounds(some, c.lbx, c.ubx)[1] == 0 for some in (zero, settled))
+    assert np.all(of_settled <= of_branch)
+    w = np.where(of_settled, 0.0, 1.0)
+    at = c.evaluate(w)
+    assert np.all(np.minimum(at.G, at.H) == 0)
