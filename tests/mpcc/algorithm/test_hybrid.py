@@ -8,6 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from problems import small_mpccs
+from problems.parts import parts
 from problems.surface_at_end import Surface
 from pyomo.mpec import Complementarity, complements
 from scipy.optimize import linprog
@@ -53,6 +54,18 @@ def test_a_steep_term_leaves_the_rest_of_the_objective_exact(steepness):
     m.f = pyo.Objective(expr=steepness * (m.x - 1) ** 2 + m.y + 2 * m.z)
     assert solve(m).solver.stationarity == 'B'
     assert pyo.value(m.f) == pytest.approx(1 - 1 / (4 * steepness), abs=2e-6)
+
+
+def test_a_complementary_point_is_not_given_up_for_a_relaxed_one():
+    # rows of the relaxed one hold more exactly, and its objective is lower
+    model = small_mpccs.pair(1.0, 0.0)
+    model.sum = pyo.Constraint(expr=model.x + model.y == 1)
+    model.f = pyo.Objective(expr=model.x**2 + model.y**2)
+    p = parts(model)
+    good, relaxed = (np.array(p.point(**values)) for values in ({'x': 1 + 1e-9, 'y': 0.0}, {'x': 0.5, 'y': 0.5}))
+    for w in (relaxed, good, relaxed):
+        p.subsolves.keep_least_infeasible(w)
+    assert p.run.w is good
 
 
 def test_infeasible_problem_is_called_infeasible_with_the_violated_pair_by_name():
