@@ -54,7 +54,7 @@ def _stabilise_element(moving, block, law, element, equations, shifts):
         gamma = equations.normal_velocity(law.gaps[t], law.forces[t][0].parent_block(), ComponentSet())
         # the opposite sign of gamma would allow a drift that keeps the gap closed while the bodies approach, where both are small
         block.rates.add(index, without_unit(gamma) == rate)
-        row = block.closed.add(index, ((gap + NOWHERE) * drift - force * rate) / (gap + force + NOWHERE) == 0)
+        row = block.closed.add(index, ((gap + NOWHERE) * drift - force * gamma) / (gap + force + NOWHERE) == 0)
         homotopy_hints(block).drifts.append(DriftSides(drift, rate, row, distances, forces))
         for xdot, slope in equations.gradient(law.gaps[t]):
             shifts[id(xdot)] = shifts.get(id(xdot), 0) + slope * drift * moving.r[element.n]
