@@ -187,13 +187,14 @@ class HybridSolver:
             self._path(w, self._branches).follow()
 
     def _feasible_without_branch(self):
-        """The least infeasible point, perhaps the start, where rows and pairs hold although no branch from there was solved."""
-        if self.run.w is None:
+        """A point, perhaps the start, where rows and pairs hold although no branch from there was solved."""
+        w = self.run.w if self.run.complementary is None else self.run.complementary
+        if w is None:
             return None
-        certificate, f = self._subsolves.measure(self.run.w), self._c.evaluate(self.run.w).f
+        certificate, f = self._subsolves.measure(w), self._c.evaluate(w).f
         if not certificate.feasible:
             return None
-        given = NlpResult(self.run.w, f, 'given', 0, np.zeros(0), np.zeros(0))
+        given = NlpResult(w, f, 'given', 0, np.zeros(0), np.zeros(0))
         return Point(given, f, replace(certificate, grade=Stationarity.UNTRIED))
 
     def _starts_at_a_solution(self):

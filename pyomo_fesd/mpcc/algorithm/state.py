@@ -164,6 +164,8 @@ class Run:
     outcome : Outcome
     w : array or None
         the point to load: the incumbent, or the least infeasible one
+    complementary : array or None
+        without an incumbent, the best point of a relaxation at which rows and pairs hold
     point : Point or None
         the incumbent
     counts : Counts
@@ -178,6 +180,7 @@ class Run:
 
     outcome: Optional[Outcome] = None
     w: Optional[np.ndarray] = None
+    complementary: Optional[np.ndarray] = None
     point: Optional[Point] = None
     counts: Counts = field(default_factory=Counts)
     eps: Optional[float] = None

@@ -148,13 +148,13 @@ class Subsolves:
         return measure(self._c, w, self.tolerances)
 
     def keep_least_infeasible(self, w):
-        """Keep the point to report if no branch is solved: a feasible and complementary one, else that of the least violation."""
-        if self.run.w is None or (self.run.point is None and self._rank(w) < self._rank(self.run.w)):
+        """Keep the point to report if no branch is solved: that of the least violation, and the best complementary one."""
+        if self.run.w is None or self.violation(w) < self.violation(self.run.w):
             self.run.w = w
-
-    def _rank(self, w):
-        is_feasible = self.measure(w).feasible
-        return not is_feasible, self._c.evaluate(w).f if is_feasible else self.violation(w)
+        if self.run.point is None and self._c.has_objective and self.measure(w).feasible:
+            best = self.run.complementary
+            if best is None or self._c.evaluate(w).f < self._c.evaluate(best).f:
+                self.run.complementary = w
 
     def note(self, message, w):
         """Log a message without running a solver."""

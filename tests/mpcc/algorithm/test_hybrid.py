@@ -65,7 +65,7 @@ def test_a_complementary_point_is_not_given_up_for_a_relaxed_one():
     good, relaxed = (np.array(p.point(**values)) for values in ({'x': 1 + 1e-9, 'y': 0.0}, {'x': 0.5, 'y': 0.5}))
     for w in (relaxed, good, relaxed):
         p.subsolves.keep_least_infeasible(w)
-    assert p.run.w is good
+    assert p.run.complementary is good
 
 
 def test_infeasible_problem_is_called_infeasible_with_the_violated_pair_by_name():
