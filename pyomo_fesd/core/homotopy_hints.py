@@ -143,7 +143,8 @@ class ImpactSides:
 class StickingSides:
     """Bodies that must not slip, at one boundary: where they meet and touch from then on, their impulse is free (theory, eq. 24).
 
-    Without an impulse the bodies could only meet at no velocity: a branch without interior.
+    Without an impulse the bodies could only meet at no velocity: a branch without interior.  What is lost is a meeting at no
+    velocity of bodies that then slip while they touch without a force.
 
     Attributes
     ----------

@@ -39,6 +39,14 @@ class ContactLaw:
     restitution: object
     sticking: dict
 
+    def distances_in(self, element) -> tuple:
+        """The distances at the left boundary and the points of an element."""
+        return tuple(self.distances[t] for t in dict.fromkeys((element.left, *element.points)))
+
+    def forces_in(self, element) -> tuple:
+        """The forces at the points of an element."""
+        return tuple(force for t in element.points for force in self.forces[t])
+
 
 def read_contacts(model: Block, wrt: ContinuousSet) -> list[ContactLaw]:
     """Return the contacts over ``wrt``."""

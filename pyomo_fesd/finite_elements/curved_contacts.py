@@ -45,8 +45,7 @@ def _is_curved(law):
 
 
 def _stabilise_element(moving, block, law, element, equations, shifts):
-    distances = tuple(law.distances[t] for t in dict.fromkeys((element.left, *element.points)))
-    forces = tuple(force for t in element.points for force in law.forces[t])
+    distances, forces = law.distances_in(element), law.forces_in(element)
     gap, force = quicksum(distances), quicksum(forces)
     for r, t in enumerate(element.points, start=1):
         index = law.name, element.n, r

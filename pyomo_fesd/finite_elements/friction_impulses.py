@@ -53,9 +53,7 @@ def _add_pair(impacts, condition, element, impulse):
 def _sides(moving, law, element, pair):
     """The hint for the pair of bodies that must not slip."""
     before = moving.grid.elements[element.n - 2]
-    forces = (force for t in before.points for force in law.forces[t])
-    meeting = (law.distances[element.left], *forces)
-    return StickingSides(pair, meeting, tuple(law.distances[t] for t in element.points))
+    return StickingSides(pair, (law.distances[element.left], *law.forces_in(before)), law.distances_in(element))
 
 
 def _sticking(impacts, conditions, label):

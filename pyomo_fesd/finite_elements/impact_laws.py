@@ -152,10 +152,10 @@ def _add_room(moving, law, element, gamma):
     if not b and _is_fixed(law.gaps[element.left]) and _is_fixed(gamma):
         return
     before = moving.grid.elements[b - 1] if b else None
-    forces = [force for t in before.points for force in law.forces[t]] if b else []
+    forces = law.forces_in(before) if b else ()
     # with Legendre's points the velocity at the end of a closed element on a curve is not 0 by itself
     ends = b and moving.grid.right_is_collocated
-    distances = tuple(law.distances[t] for t in dict.fromkeys((before.left, *before.points))) if ends else ()
+    distances = law.distances_in(before) if ends else ()
     P, N = impacts.above[law.name, b], impacts.below[law.name, b]
     # with the forces N is free in a relaxation too
     room = quicksum([distance, *forces]) if law.sticking else distance
