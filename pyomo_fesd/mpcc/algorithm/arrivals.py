@@ -1,7 +1,8 @@
 """Arrivals: the branches in which changes exactly at an end of a row of places have come in (theory, section 4).
 
 Each branch has a place of extent zero at the end, beyond the change; everything else has moved inwards up to the first place beside
-an equal one.
+an equal one.  Sides that other pairs make superfluous are no change: where no forces act, "forces or
+slip are zero" says nothing.
 """
 
 from collections.abc import Iterator
@@ -81,7 +82,7 @@ class _Change:
         return _Change(*(np.concatenate(both) for both in zip(vars(self).values(), vars(other).values())))
 
 
-def branches(c, w, sets, tolerance) -> Iterator[tuple[Entered | None, ChangedEnd | None, tuple | None]]:
+def branches(c, w, sets, tolerance, settled) -> Iterator[tuple[Entered | None, ChangedEnd | None, tuple | None]]:
     """Yield the branches of all changes at the ends of the point ``w``, in every order; None for one without a place to spare.
 
     With each comes the place at the end alone, if one change has come in at an end of all rows; and if only one system changes, the
@@ -95,12 +96,15 @@ def branches(c, w, sets, tolerance) -> Iterator[tuple[Entered | None, ChangedEnd
         at this point
     tolerance : float
         of gauges that are zero
+    settled : callable
+        takes zero sides and returns them without sides that other pairs decide
     """
     if not c.arrivals:
         return
-    at_end, by_row = np.abs(c.measured(w)) <= tolerance, {}
+    at_end, by_row, as_it_is = np.abs(c.measured(w)) <= tolerance, {}, settled(sets.zero)
     for arrival in c.arrivals:
-        changes = [*_toggled(arrival, sets, at_end), *_optional(arrival, sets, at_end)]
+        toggled = (change for change in _toggled(arrival, sets, at_end) if np.any(settled(_changed(sets.zero, change)) != as_it_is))
+        changes = [*toggled, *_optional(arrival, sets, at_end)]
         if changes:
             by_row.setdefault(id(arrival.rows), (arrival.rows, []))[1].append(changes)
     for rows, present in by_row.values():
@@ -157,6 +161,13 @@ def _flipped(toggles, sets):
     return _Change(np.concatenate(pairs), np.concatenate(sides), NONE)
 
 
+def _changed(zero, change):
+    """Zero sides with those of a change."""
+    zero = zero.copy()
+    zero[change.pairs] = change.sides
+    return zero
+
+
 def _optional(arrival, sets, at_end) -> Iterator[_Change]:
     for option in arrival.options:
         if at_end[option.gauges].all() and np.array_equal(sets.zero[option.required], option.required_sides):
@@ -172,7 +183,7 @@ def _entered(rows, sequence, sets, w):
             if moved is None:
                 return None
             zero, start = moved
-        zero[change.pairs] = change.sides
+        zero = _changed(zero, change)
         either.append(change.either)
     extents = [place.extent for row in rows for place in row[: len(sequence)]]
     between = len(rows) == 2 and len(sequence) == 1
@@ -184,8 +195,7 @@ def _changed_end(rows, sequence, sets):
     (row, *others), (change, *more) = rows, sequence
     if others or more or len(row) < 2 or None in (row[0].extent, row[1].extent):
         return None
-    zero = sets.zero.copy()
-    zero[change.pairs] = change.sides
+    zero = _changed(sets.zero, change)
     targets, sources = (np.concatenate(both) for both in zip(*((m.targets, m.sources) for m in (row[1].inside, row[1].between))))
     return ChangedEnd(row[0].extent, row[1].extent, zero, change.pairs, change.either, targets, sources)
 

@@ -120,7 +120,7 @@ class Orders:
                     yield Order(earlier, judges[1:], before)
                 else:
                     yield Order(later + earlier, judges, after)
-        for entered, changed, alone in branches(self._c, w, sets, self._tolerances.biactive):
+        for entered, changed, alone in branches(self._c, w, sets, self._tolerances.biactive, partial(self._subsolves.settled, w)):
             judges = [partial(inserted.entered, entered), partial(inserted.at_end, changed)]
             yield Order([] if entered is None else [entered], judges, None if alone is None else AtEnd(*alone))
 

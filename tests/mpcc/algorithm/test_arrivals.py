@@ -27,15 +27,16 @@ def toggles(*gauges):
     return tuple(ToggleIndices(np.array([pair]), None, gauge, NONE, NONE) for pair, gauge in enumerate(gauges))
 
 
-def both(arrivals, zero, gauges, extents):
+def both(arrivals, zero, gauges, extents, settled=np.copy):
     """The branches, each with the changed end and the system that changes alone."""
     compiled = SimpleNamespace(arrivals=arrivals, measured=lambda w: np.array(gauges, dtype=float))
     zero = np.array(zero)
-    return list(branches(compiled, np.array(extents, dtype=float), ActiveSets(zero, np.zeros(len(zero), dtype=bool)), 1e-6))
+    sets = ActiveSets(zero, np.zeros(len(zero), dtype=bool))
+    return list(branches(compiled, np.array(extents, dtype=float), sets, 1e-6, settled))
 
 
-def found(*given):
-    return [entered for entered, *_ in both(*given)]
+def found(*given, **more):
+    return [entered for entered, *_ in both(*given, **more)]
 
 
 ONE_MODE = [G_ZERO, H_ZERO]
@@ -48,6 +49,16 @@ def test_a_surface_at_the_end_leads_to_the_other_mode_or_onto_it():
     for entered, mode in ((onto, BOTH), (beyond, OTHER_MODE)):
         assert entered.zero.tolist() == [*mode, *ONE_MODE] and entered.extents.tolist() == [0]
         assert entered.start.tolist() == [0, 2]
+
+
+def test_sides_that_other_pairs_make_superfluous_are_no_change():
+    def settled(zero):
+        # pair 1 of the place at the end makes pair 0 hold
+        return np.array([G_ZERO if zero[1] == H_ZERO else zero[0], *zero[1:]])
+
+    given = [ArrivalIndices((row(2),), toggles(0, 1), ())], ONE_MODE * 2, [0, 0], [1, 1]
+    (beyond,) = found(*given, settled=settled)
+    assert beyond.zero.tolist() == [*OTHER_MODE, *ONE_MODE]
 
 
 def test_a_surface_elsewhere_leads_nowhere():
