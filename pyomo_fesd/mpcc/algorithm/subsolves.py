@@ -126,14 +126,23 @@ class Subsolves:
 
     def patience(self) -> dict:
         """HiGHS' limit of time for an LPEC that proves nothing."""
+        return {'time_limit': self._patience()}
+
+    def _patience(self):
         spent = sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch'))
-        return {'time_limit': max(LEAST_TIME, SHARE * spent)}
+        return max(LEAST_TIME, SHARE * spent)
 
     def certify(self, nlp, equal):
-        """Certify the solution of a branch NLP, whatever the limits; HiGHS stops at the deadline."""
-        started = time.perf_counter()
+        """Certify the end of a branch NLP, whatever the limits; HiGHS stops at the deadline.
+
+        Where the NLP did not reach its solution a certificate is unlikely, and its LPEC may take longer than all NLPs: it stops
+        early.
+        """
+        started, lpec = time.perf_counter(), self._lpec
+        if not nlp.solved:
+            lpec = lpec.until(self._setup.deadline.at_most(self._patience()))
         with phase(self._setup.timer, 'lpec'):
-            certificate = certify_point(self._c, self._lpec, nlp.w, self.tolerances, equal, -nlp.lam_g)
+            certificate = certify_point(self._c, lpec, nlp.w, self.tolerances, equal, -nlp.lam_g)
         if certificate.lpec is not None:
             self._count(certificate.lpec)
         self._log('certificate', 0.0, nlp.w, 0, certificate.grade.name, started)

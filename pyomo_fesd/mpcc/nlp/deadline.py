@@ -29,6 +29,10 @@ class Deadline:
         left = self.left()
         return Deadline.after(None if left is None else share * left)
 
+    def at_most(self, seconds: float) -> 'Deadline':
+        """The deadline this many seconds from now, or this one if it is earlier."""
+        return self if self.within(seconds) else Deadline.after(seconds)
+
     def left(self) -> float | None:
         """Seconds left, not below 0; None without a deadline."""
         return None if self.at is None else max(0.0, self.at - time.perf_counter())

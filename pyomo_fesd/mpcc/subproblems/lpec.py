@@ -18,6 +18,7 @@ A descent that is small beside the terms of the objective's gradient may still m
 terms.  It is no proof against the point, but worth a look (``LpecResult.matters``).
 """
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -102,6 +103,12 @@ class Lpec:
         check_options('HiGHS', options, refusal, 'lpec_options')
         self._c, self._sides, self._options, self._deadline = compiled, sides, options, deadline or Deadline()
         self._known_changes = LastPoints(self._changes)
+
+    def until(self, deadline):
+        """The same LPECs with a deadline of their own."""
+        other = copy(self)
+        other._deadline = deadline
+        return other
 
     def solve(self, w, sets, Delta, equal=None, beyond=False, multipliers=None, enough=None, limits=None) -> LpecResult:
         """Solve the LPEC at ``w`` with active sets ``sets``, trust region ``Delta`` and the decisions ``equal`` imposed.
