@@ -16,6 +16,7 @@ from scipy import sparse
 
 from pyomo_fesd.mpcc.compile import Outer, composed, csr_pattern, take
 from pyomo_fesd.mpcc.subproblems.active_set import FREE
+from pyomo_fesd.mpcc.subproblems.differences import Differences
 from pyomo_fesd.mpcc.subproblems.impact_sides import give_interior
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, infeasible
 from pyomo_fesd.mpcc.subproblems.side_constraints import settle, with_shares
@@ -51,6 +52,7 @@ class Branch:
         nlp = composed(c, Outer(z, ca.SX(0, 1), weight, ca.SX(0), rows, weight))
         self._pattern = csr_pattern(nlp.derivatives.jacobian)
         self._values = ca.Function('rows', [nlp.x, nlp.p], [nlp.g])
+        self._differences = Differences(c, nlp)
         given = nlp.x, nlp.p, nlp.f, nlp.g
         exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': max(OPTIMALITY * min(1.0, c.scale.f), LEAST)}
         self._nlp, self._far = (make('branch', *given, budget, nlp.derivatives) for budget in (NEAR | exact, exact))
@@ -127,6 +129,8 @@ class Branch:
         lbg, ubg = self._row_bounds(zero, equal)
         give_interior(c, zero, lbx, ubx, lbg, ubg)
         fix_single(c, w, lbx, ubx, lbg, ubg)
+        box = None if box is None else tuple(bound.copy() for bound in box)
+        joined = self._differences.join(w, lbx, ubx, box)
         w = np.clip(w, lbx, ubx)
         if not self._drop_settled_rows(w, lbx == ubx, lbg, ubg, settled):
             return None
@@ -135,7 +139,8 @@ class Branch:
             free = lbx < ubx
             lbx, ubx = np.where(free, np.maximum(lbx, box[0]), lbx), np.where(free, np.minimum(ubx, box[1]), ubx)
         nlp = self._far if far else self._nlp
-        return nlp.solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, self._start(duals), max_iter)
+        result = nlp.solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, self._start(duals), max_iter)
+        return replace(result, w=self._differences.parted(result.w, joined))
 
     def on_sides(self, w, zero):
         """Return ``w`` within the bounds of the branch ``zero``; None if these contradict each other."""
