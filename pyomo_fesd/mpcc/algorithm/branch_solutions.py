@@ -50,15 +50,20 @@ class BranchSolutions:
             solved, equal = (solved, equal) if again is None else (again, decided)
         if solved is None:
             return None
-        f = self._c.evaluate(solved.w).f
+        f = self._c.evaluate(solved.w).f + self._owed(solved)
         if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
-            if f < self._c.evaluate(self._c.x0).f:
+            if self._c.evaluate(solved.w).f < self._c.evaluate(self._c.x0).f:
                 raise Stop(Outcome.UNBOUNDED)
             return None
         if _is_clearly_above(f, below) or f > enough:
             return None
         certificate = self._subsolves.certify(solved, equal)
         return Point(solved, f, certificate, equal) if certificate.feasible else None
+
+    def _owed(self, solved):
+        """What the objective owes to violated rows, by their multipliers: no progress, though the rows hold to the tolerances."""
+        rows, _ = self._c.violations(solved.w)
+        return float(np.abs(solved.lam_g[: len(rows)]) @ rows)
 
     def _solve(self, w, zero, duals, below, **more):
         """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force."""

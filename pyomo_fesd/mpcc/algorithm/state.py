@@ -142,7 +142,10 @@ class Counts:
 
 @dataclass
 class Point:
-    """An exactly complementary point: the NlpResult of its branch with objective, Certificate and the decisions in force."""
+    """An exactly complementary point: the NlpResult of its branch with Certificate and the decisions in force.
+
+    ``f`` is its objective, and what that owes to rows that hold to the tolerances only.
+    """
 
     nlp: object
     f: float

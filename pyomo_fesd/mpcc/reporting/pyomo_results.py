@@ -61,7 +61,7 @@ def fill_results(results, model, run, loaded, compiled=None, reason='', names=la
     if compiled is not None:
         info.pairs, info.missing_values = len(compiled.conditions), compiled.missing
         if run.point is not None and compiled.has_objective:
-            results.incumbent_objective = compiled.objective(run.point.f)
+            results.incumbent_objective = compiled.objective(compiled.evaluate(run.point.w).f)
     _fill_certificate(info, certificate)
     info.violated = _violated(compiled, run, partial(names, model))
     if info.violated:

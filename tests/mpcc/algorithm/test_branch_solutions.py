@@ -1,0 +1,31 @@
+"""What an objective owes to violated rows is no progress."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pyomo.environ as pyo
+import pytest
+from pyomo.common.timing import HierarchicalTimer
+from pyomo.mpec import Complementarity, complements
+
+from pyomo_fesd.mpcc.algorithm.branch_solutions import BranchSolutions
+from pyomo_fesd.mpcc.compile.compile import compile_mpcc
+from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc
+
+
+@pytest.mark.parametrize('violation', [0.0, 1e-7, -1e-7])
+def test_multipliers_say_what_a_violation_is_worth(violation):
+    m = pyo.ConcreteModel()
+    m.x, m.y = pyo.Var(bounds=(0, None), initialize=1 + violation), pyo.Var(bounds=(0, None), initialize=0)
+    m.low = pyo.Constraint(expr=m.x >= 1)
+    m.equal = pyo.Constraint(expr=m.x + m.y == 1)
+    m.pair = Complementarity(expr=complements(m.x >= 0, m.y >= 0))
+    m.cost = pyo.Objective(expr=300 * m.x)
+    c = compile_mpcc(read_mpcc(m), HierarchicalTimer())
+    lam = np.array([{'low': 200.0, 'equal': 100.0}[row.name] for row in c.constraints])
+    solutions = BranchSolutions(SimpleNamespace(compiled=c, tolerances=None))
+    owed = solutions._owed(SimpleNamespace(w=c.x0, lam_g=np.append(lam, 1e6)))
+    rows, _ = c.violations(c.x0)
+    assert owed == pytest.approx(sum(lam * rows), abs=1e-12) and (owed > 0) == (violation != 0)
+    # x below its bound violates both rows, above it only the equation
+    assert np.count_nonzero(rows) == {0.0: 0, 1e-7: 1, -1e-7: 2}[violation]
