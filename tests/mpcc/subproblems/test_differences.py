@@ -1,5 +1,6 @@
 """Differences of variables >= 0 get one variable each in a branch, and both have their parts at its solution."""
 
+import casadi
 import numpy as np
 import pyomo.environ as pyo
 import pytest
@@ -10,8 +11,6 @@ from pyomo_fesd.mpcc.compile import Outer, composed, take
 from pyomo_fesd.mpcc.compile.compile import compile_mpcc
 from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc
 from pyomo_fesd.mpcc.subproblems.differences import Differences
-
-casadi = pytest.importorskip('casadi')
 
 
 def slip(speed=-2.0, factor=1.0):
