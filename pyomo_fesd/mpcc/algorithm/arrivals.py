@@ -1,8 +1,8 @@
 """Arrivals: the branches in which changes exactly at an end of a row of places have come in (theory, section 4).
 
 Each branch has a place of extent zero at the end, beyond the change; everything else has moved inwards up to the first place beside
-an equal one.  Sides that other pairs make superfluous are no change: where no forces act, "forces or
-slip are zero" says nothing.
+an equal one.  Sides that other pairs make superfluous are no change: where no forces act, "forces or slip are zero" says nothing
+more.
 """
 
 from collections.abc import Iterator

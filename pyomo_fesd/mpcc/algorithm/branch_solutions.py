@@ -50,11 +50,12 @@ class BranchSolutions:
             solved, equal = (solved, equal) if again is None else (again, decided)
         if solved is None:
             return None
-        f = self._c.evaluate(solved.w).f + self._owed(solved)
+        f = self._c.evaluate(solved.w).f
         if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
-            if self._c.evaluate(solved.w).f < self._c.evaluate(self._c.x0).f:
+            if f < self._c.evaluate(self._c.x0).f:
                 raise Stop(Outcome.UNBOUNDED)
             return None
+        f += self._owed(solved)
         if _is_clearly_above(f, below) or f > enough:
             return None
         certificate = self._subsolves.certify(solved, equal)

@@ -32,8 +32,8 @@ GAP, ASTRAY = 0.5, 0.5
 UNDECIDED = 0.5
 #: Part of the time limit after which no further round begins: the best point is certified in the rest.
 SHARE = 0.6
-#: A completion may take this many times as long as the relaxation before, and at least these seconds: several times what one takes
-#: on a loaded machine, so that its load does not decide which points are found.
+#: A completion may take this many times as long as the relaxation before, and at least these seconds: twice what one of a ball's
+#: took with three jobs on two cores, as the load of the machine should not decide which points are found.
 LONGER, LEAST_TIME = 2.0, 10.0
 #: Branch NLPs from one relaxation: one that stops on its way has better values of the free variables, but perhaps the wrong branch.
 ATTEMPTS = 2

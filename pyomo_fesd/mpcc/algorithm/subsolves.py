@@ -126,11 +126,8 @@ class Subsolves:
 
     def patience(self) -> dict:
         """HiGHS' limit of time for an LPEC that proves nothing."""
-        return {'time_limit': self._patience()}
-
-    def _patience(self):
         spent = sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch'))
-        return max(LEAST_TIME, SHARE * spent)
+        return {'time_limit': max(LEAST_TIME, SHARE * spent)}
 
     def certify(self, nlp, equal):
         """Certify the end of a branch NLP, whatever the limits; HiGHS stops at the deadline.
@@ -140,7 +137,7 @@ class Subsolves:
         """
         started, lpec = time.perf_counter(), self._lpec
         if not nlp.solved:
-            lpec = lpec.until(self._setup.deadline.at_most(self._patience()))
+            lpec = lpec.until(self._setup.deadline.at_most(self.patience()['time_limit']))
         with phase(self._setup.timer, 'lpec'):
             certificate = certify_point(self._c, lpec, nlp.w, self.tolerances, equal, -nlp.lam_g)
         if certificate.lpec is not None:

@@ -12,7 +12,7 @@ starts), ``mpcc_data`` and ``mpcc_functions`` (the result) with ``numeric_functi
 """
 
 from pyomo_fesd.mpcc.compile.assemble import NATURAL_UNITS
-from pyomo_fesd.mpcc.compile.casadi_matrices import csr, csr_pattern, take
+from pyomo_fesd.mpcc.compile.casadi_matrices import csr_pattern, take
 from pyomo_fesd.mpcc.compile.compile import compile_mpcc
 from pyomo_fesd.mpcc.compile.derivatives import Derivatives, Outer, automatic, composed, plain_nlp, with_parts
 from pyomo_fesd.mpcc.compile.last_points import LastPoints

@@ -48,11 +48,13 @@ class Branch:
     def __init__(self, c, sides, make):
         self._c, self._sides = c, sides
         weight, z = ca.SX.sym('weight'), ca.SX.sym('z', c.inner)
-        rows = take(z, [*sides.chosen, *range(2 * c.pairs, z.numel())])
+        inner = [*sides.chosen, *range(2 * c.pairs, z.numel())]
+        rows = take(z, inner)
         nlp = composed(c, Outer(z, ca.SX(0, 1), weight, ca.SX(0), rows, weight))
         self._pattern = csr_pattern(nlp.derivatives.jacobian)
         self._values = ca.Function('rows', [nlp.x, nlp.p], [nlp.g])
-        self._differences = Differences(c, nlp)
+        m = len(c.lbg)
+        self._differences = Differences(c, nlp, np.array([*range(m), *(m + i for i in inner)], dtype=int))
         given = nlp.x, nlp.p, nlp.f, nlp.g
         exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': max(OPTIMALITY * min(1.0, c.scale.f), LEAST)}
         self._nlp, self._far = (make('branch', *given, budget, nlp.derivatives) for budget in (NEAR | exact, exact))

@@ -14,7 +14,7 @@ Leaves: bounds, start and trust region with one variable for each difference; an
 import casadi as ca
 import numpy as np
 
-from pyomo_fesd.mpcc.compile import LastPoints, csr, csr_pattern
+from pyomo_fesd.mpcc.compile import LastPoints, csr_pattern
 
 #: Digits to which the entries of two columns agree.
 DIGITS = 12
@@ -28,22 +28,23 @@ class Differences:
     ----------
     c : MpccFunctions
     nlp : Nlp
+    rows : int array
+        stacked numbers of its rows
     """
 
-    def __init__(self, c, nlp):
-        self._c, d = c, nlp.derivatives
+    def __init__(self, c, nlp, rows):
+        self._c, self._rows = c, rows
         # without an entry in gradient and Hessian a variable is in no cost, and linear in all rows
-        in_hessian = csr_pattern(d.hessian)
+        in_hessian = csr_pattern(nlp.derivatives.hessian)
         used = np.diff(in_hessian.indptr) + np.diff(in_hessian.tocsc().indptr)
         used[ca.jacobian_sparsity(nlp.f, nlp.x).get_col()] += 1
         (self._among,) = np.nonzero((used == 0) & (c.lbx == 0.0) & (c.ubx == np.inf))
-        self._slopes = ca.Function('slopes', [nlp.x, nlp.p], [d.jacobian]) if len(self._among) > 1 else None
         # slopes may contain parameters
         self._known = LastPoints(self._found)
 
     def join(self, w, lbx, ubx, box) -> tuple:
         """Give differences one variable each, in place; ``box`` is a trust region or None.  Returns what ``parted`` takes."""
-        i, j, ratio = self._known(self._c.x0, self._c.parameters) if self._slopes else NONE
+        i, j, ratio = self._known(self._c.x0, self._c.parameters)
         free = np.all([(lbx[k] == 0.0) & (ubx[k] == np.inf) for k in (i, j)], axis=0)
         i, j, ratio = i[free], j[free], ratio[free]
         w[j] -= ratio * w[i]
@@ -62,9 +63,11 @@ class Differences:
         w[j] = np.maximum(w[j], 0.0)
         return w
 
-    def _found(self, w, parameters):
+    def _found(self, w, _):
         """The variables x_i and x_j of all differences, and a / b."""
-        J = csr(self._slopes(w.tolist(), [0.0, *parameters.tolist()])).tocsc()
+        if len(self._among) < 2:
+            return NONE
+        J = self._c.stacked_jacobian(w)[self._rows].tocsc()
         J.eliminate_zeros()
         unpaired, found = {}, []
         for k in self._among.tolist():

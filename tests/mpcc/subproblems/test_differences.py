@@ -32,8 +32,8 @@ def compiled(m):
 
 def differences(c):
     z = casadi.SX.sym('z', c.inner)
-    rows = take(z, range(2 * c.pairs, c.inner))
-    return Differences(c, composed(c, Outer(z, casadi.SX(0, 1), casadi.SX.sym('weight'), casadi.SX(0), rows, 0.0)))
+    nlp = composed(c, Outer(z, casadi.SX(0, 1), casadi.SX.sym('weight'), casadi.SX(0), take(z, range(2 * c.pairs, c.inner)), 0.0))
+    return Differences(c, nlp, np.arange(len(c.lbg)))
 
 
 def joined(c, box=None, **bounds):
