@@ -3,7 +3,8 @@
 Two crossings between neighbouring collocation points leave no trace in the signs at these points.
 
 After a slide that ends smoothly (its multiplier has arrived at that of the next element, so the function leaves zero without a
-slope), the error of the polynomials decides their sign next to the boundary: there a wrong one tells nothing.
+slope), the error of the polynomials decides their sign next to the boundary: there a wrong one tells nothing.  Nor does it before
+the first collocation point where bodies part at the boundary.
 
 Takes: a solved model with a moving grid.
 Leaves: messages.
@@ -77,8 +78,8 @@ class _Kept:
         the multiplier of a switching function
     before : float
         its largest value in elements before those on the grid
-    is_gap : bool
-        whether it is the gap of a contact, which has no slope where a force ends
+    rates : dict number of a boundary -> expression, or None
+        the rate of a gap after each boundary; a gap has no slope where a force ends
     """
 
     name: str
@@ -87,7 +88,12 @@ class _Kept:
     sign: Callable
     nu: dict | None = None
     before: float = 0.0
-    is_gap: bool = False
+    rates: dict | None = None
+
+    @property
+    def is_gap(self):
+        """Whether it is the gap of a contact."""
+        return self.rates is not None
 
     @cached_property
     def largest(self):
@@ -113,6 +119,11 @@ class _Kept:
         end = sum(weight * self.nu[t].value for weight, t in zip(weights, before.points))
         return abs(end - self.nu[element.points[0]].value) <= ARRIVED
 
+    def parts(self, element):
+        """Whether bodies part at the left boundary of ``element``."""
+        rate = self.rates.get(element.n - 1) if self.is_gap else None
+        return rate is not None and value(rate) * value(element.length) >= -self.zero
+
 
 def _kept(moving, functions):
     """Switching functions, conditions of modes with hysteresis, guards, and gaps of contacts."""
@@ -127,7 +138,12 @@ def _kept(moving, functions):
         yield _Kept(jump.name, jump.guards, _numbers(jump.guards), lambda _, element: 1)
     impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
     for law in [] if impacts is None else impacts.laws:
-        yield _Kept(law.name, law.gaps, _numbers(law.gaps), _sign_of_gap, is_gap=True)
+        yield _Kept(law.name, law.gaps, _numbers(law.gaps), _sign_of_gap, rates=_rates(impacts, law.name))
+
+
+def _rates(impacts, name):
+    """P - N at each boundary: a positive multiple of the normal velocity after it (eq. 21), or 0 after an impact."""
+    return {b: impacts.above[contact, b] - N for (contact, b), N in impacts.below.items() if contact == name}
 
 
 def _numbers(by_label):
@@ -165,6 +181,8 @@ def _crossing(kept, element, grid, after):
     values = sign * _interpolation(NODES, INSIDE) @ at_nodes
     if kept.leaves_smoothly(element, grid):
         values = np.where(np.logical_or.accumulate(values >= 0), values, 0.0)
+    if kept.parts(element):
+        values = np.where(np.array(INSIDE) < grid.tau[0], 0.0, values)
     worst, part = int(np.argmin(values)), PENETRATION if kept.is_gap else SIGNIFICANT
     return (element, INSIDE[worst]) if values[worst] < -part * max(largest, np.abs(values).max()) else None
 

@@ -109,7 +109,8 @@ class Relaxation:
         """Solve from ``w``, with the multipliers of an earlier result of this form if given."""
         c = self._c
         lbx, ubx, lbg, ubg = c.lbx.copy(), c.guide_ubx.copy(), self._lbg.copy(), self._ubg.copy()
-        fix_single(c, w, lbx, ubx, lbg, ubg)
+        # such are distances that are zero; fixing shares that are one leads the path elsewhere and gains nothing
+        fix_single(c, w, lbx, ubx, lbg, ubg, least_only=True)
         if self._slack:
             at = c.evaluate(w)
             w = np.append(w, min(1.0, (at.G * at.H).max(initial=0.0) + ROOM))

@@ -12,8 +12,8 @@ import numpy as np
 AT_BOUND = 1e-12
 
 
-def fix_single(c, w, lbx, ubx, lbg, ubg):
-    """Fix the variables that such rows put at a bound, in place."""
+def fix_single(c, w, lbx, ubx, lbg, ubg, least_only=False):
+    """Fix the variables that such rows put at a bound, or only those at their lower bound, in place."""
     rows, columns = c.single_rows
     if not len(rows):
         return
@@ -21,7 +21,7 @@ def fix_single(c, w, lbx, ubx, lbg, ubg):
     with np.errstate(divide='ignore', invalid='ignore'):
         # a parameter may have made a slope zero
         value = w[columns] + (c.lbg[rows] - c.evaluate(w).g[rows]) / slopes
-    for bound in (lbx.copy(), ubx.copy()):
+    for bound in (lbx.copy(),) if least_only else (lbx.copy(), ubx.copy()):
         at = (np.abs(value - bound[columns]) <= AT_BOUND) & (lbx[columns] < ubx[columns])
         lbx[columns[at]] = ubx[columns[at]] = bound[columns[at]]
         lbg[rows[at]], ubg[rows[at]] = -np.inf, np.inf

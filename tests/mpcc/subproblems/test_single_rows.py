@@ -39,6 +39,14 @@ def test_only_a_value_at_a_bound_is_fixed(at, fixed):
         assert lbx[x] / c.scale.x[x] == at
 
 
+@pytest.mark.parametrize('at, fixed', [(0, True), (4, False)])
+def test_least_only_leaves_a_value_at_an_upper_bound(at, fixed):
+    c = compile_mpcc(read_mpcc(with_rows(at)), HierarchicalTimer())
+    lbx, ubx, lbg, ubg = c.lbx.copy(), c.ubx.copy(), c.lbg.copy(), c.ubg.copy()
+    fix_single(c, c.x0, lbx, ubx, lbg, ubg, least_only=True)
+    assert np.any((lbx != c.lbx) | (ubx != c.ubx)) == fixed and np.any(lbg != c.lbg) == fixed
+
+
 @pytest.mark.parametrize('at', [0, 4, 2])
 def test_a_solve_has_such_a_row(at):
     m = with_rows(at)
