@@ -296,9 +296,9 @@ def draw(real, steps):
     figure.savefig(PICTURE, dpi=150)
 
 
-def main():
+def main(steps=60):
     """Close the loop, count the origins of the answers, draw."""
-    real, steps = loop()
+    real, steps = loop(steps)
     print(steps['origin'].value_counts().to_string())
     print(f"median time of a step: {1e3 * steps['seconds'].median():.0f} ms")
     draw(real, steps)

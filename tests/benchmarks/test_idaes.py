@@ -61,9 +61,9 @@ FAST = [
     ('CSTR', 10, 1e-4, 1e-6),
     ('lumped heat exchanger', 5, 1e-6, 1e-6),
     ('PID pump', 20, 2e-3, 1e-4),
-    ('steam tanks, windup', 20, 5e-3, 5e-4),
-    ('gas pipeline', 20, 1e-5, 1e-6),
-    ('temperature-swing adsorption', 20, 1e-8, 1e-7),
+    ('steam tanks, windup', 10, 5e-2, 2e-3),
+    ('gas pipeline', 5, 1e-5, 1e-6),
+    ('temperature-swing adsorption', 5, 1e-8, 1e-7),
 ]
 
 

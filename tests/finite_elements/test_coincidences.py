@@ -209,7 +209,7 @@ def certified_and_minima(case, kind, seeds):
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('case', TOGETHER)
 def test_events_at_one_time_are_not_certified_where_a_slope_descends(case, kind):
-    found = list(certified_and_minima(case, kind, range(12)))
+    found = list(certified_and_minima(case, kind, range(4)))
     assert any(not minimum for _, minimum in found)
     assert all(minimum for certified, minimum in found if certified)
 
@@ -220,7 +220,7 @@ CERTIFIED += [('two', 'hysteresis'), ('two', 'jump'), ('two at the end', 'hyster
 
 @pytest.mark.parametrize('case, kind', CERTIFIED)
 def test_events_are_certified_where_no_slope_descends(case, kind):
-    found = list(certified_and_minima(case, kind, [0, 1, 6, 13, 17, 27, 45]))
+    found = list(certified_and_minima(case, kind, [0, 6, 13, 45]))
     assert any(minimum for _, minimum in found)
     assert all(certified == minimum for certified, minimum in found)
 
