@@ -21,11 +21,20 @@ UNBOUNDED = 1e15
 
 
 class BranchSolutions:
-    """The solutions of the branches of one run; ``subsolves`` are its NLPs."""
+    """The solutions of the branches of one run.
 
-    def __init__(self, subsolves):
+    Parameters
+    ----------
+    subsolves : Subsolves
+        their NLPs
+    at_once : bool
+        whether a branch is first solved with the decisions that its sides ask for: without any, places of an objective that is
+        large beside the penalty shrink to nothing
+    """
+
+    def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
-        self._known = {}
+        self._at_once, self._known = at_once and self._c.eta.numel() > 0, {}
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -68,6 +77,10 @@ class BranchSolutions:
 
     def _solve(self, w, zero, duals, below, **more):
         """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force."""
+        if self._at_once:
+            solved, equal = self._decided_by_sides(w, zero, duals=duals, **more)
+            if solved is not None and solved.solved:
+                return solved, equal
         first = self._subsolves.attempt(w, zero, None, 1.0, duals=duals, **more)
         if first is not None and not self._subsolves.usable(first):
             return self._decided_at_once(w, zero, first, **more)
@@ -83,8 +96,15 @@ class BranchSolutions:
         at_sides = self._subsolves.on_sides(w, zero) if self._c.eta.numel() else None
         if at_sides is None or self._subsolves.violation(first.w) > max(NEAR, NEARER * self._subsolves.violation(at_sides)):
             return None, None
+        return self._decided_by_sides(w, zero, far=True, **more | {'max_iter': None})
+
+    def _decided_by_sides(self, w, zero, **more):
+        """The NLP of a branch with the decisions that its sides ask for; a solution that asks for others does not count."""
+        at_sides = self._subsolves.on_sides(w, zero)
+        if at_sides is None:
+            return None, None
         equal = self._c.evaluate(at_sides).eta > self._tolerances.eta
-        solved = self._subsolves.branch(w, zero, equal, 0.0, far=True, **more | {'max_iter': None})
+        solved = self._subsolves.branch(w, zero, equal, 0.0, **more)
         if solved is None or np.any((self._c.evaluate(solved.w).eta > self._tolerances.eta) & ~equal):
             return None, None
         return solved, equal

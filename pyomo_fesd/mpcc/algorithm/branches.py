@@ -7,7 +7,7 @@ from collections import Counter, deque
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import FIRST, SECOND, BranchSolutions
+from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, FIRST, SECOND, BranchSolutions
 from pyomo_fesd.mpcc.algorithm.neighbours import Neighbours
 from pyomo_fesd.mpcc.algorithm.search import FEW, Verdict, exhaust, leaves
 from pyomo_fesd.mpcc.algorithm.state import Point
@@ -54,7 +54,7 @@ class Branches:
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
         self._attempts, self._solved, self._exhausted = Counter(), {}, {}
         self._first = SECOND if patient else FIRST
-        self.solutions, self.neighbours = BranchSolutions(subsolves), Neighbours(subsolves)
+        self.solutions, self.neighbours = BranchSolutions(subsolves, at_once=patient), Neighbours(subsolves)
 
     # called by the algorithm
 
@@ -158,6 +158,18 @@ class Branches:
         for zero in self.neighbours.beside_short(point):
             found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f, enough=enough)
             if found is not None:
+                return found
+        return None
+
+    def with_fewer_short(self, point):
+        """A certified point that is as good in such a branch, with fewer variables at their lower bound; None if there is none.
+
+        Orders of changes beside a place of least extent are not known.
+        """
+        enough, number = point.f + AS_GOOD * max(1.0, abs(point.f)), self.neighbours.number_of_short(point.w)
+        for zero in self.neighbours.beside_short(point):
+            found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f, enough=enough)
+            if found is not None and found.certificate.certified and self.neighbours.number_of_short(found.w) < number:
                 return found
         return None
 

@@ -49,6 +49,10 @@ class Coincidences:
             # until all orders are settled any certified point is better
             self.run.point = replace(before, certificate=replace(before.certificate, grade=Stationarity.OPEN))
             found = self._outcome(before)
+            other = self._branches.with_fewer_short(before) if found is OPEN else None
+            if other is not None:
+                self.run.point = other
+                continue
             if found is SETTLED:
                 self.run.point = self._settled = before
             elif found is not OPEN:

@@ -57,6 +57,11 @@ class Neighbours:
         short = neighbour.short
         return not short.size or bool(np.any(point.w[short] <= self._c.lbx[short] + AT_BOUND))
 
+    def number_of_short(self, w) -> int:
+        """Return how many variables are at their lower bound, of those for which there are neighbouring branches."""
+        short = np.unique(np.concatenate([neighbour.short for neighbour in self.all], dtype=int)) if self.all else []
+        return int(np.count_nonzero(w[short] <= self._c.lbx[short] + AT_BOUND))
+
     def beside_short(self, point) -> Iterator[np.ndarray]:
         """Yield the zero sides of the neighbouring branches for each variable at its lower bound."""
         sides = (self.zero_sides(point, neighbour) for neighbour in self.all if neighbour.short.size)

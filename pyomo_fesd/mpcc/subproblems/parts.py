@@ -55,8 +55,15 @@ class Parts:
 
     def is_beside_a_short_one(self, w, k):
         """Whether part ``k`` or one beside it has nearly no extent: what it holds need not be what follows or precedes."""
-        beside = [w[self.all[j].extent] for j in (k - 1, k, k + 1) if 0 <= j < len(self.all)]
+        beside = self._extents(w, k - 1, k, k + 1)
         return min(beside) < SHORT * max(beside)
+
+    def is_between_short_ones(self, w, k, ahead):
+        """Whether part ``k``, or the one on the other side of its beginning (``ahead``) or end, has nearly no extent."""
+        return min(self._extents(w, k, k - 1 if ahead else k + 1)) < SHORT * max(self._extents(w, k - 1, k, k + 1))
+
+    def _extents(self, w, *numbers):
+        return [w[self.all[j].extent] for j in numbers if 0 <= j < len(self.all)]
 
     @cached_property
     def of_variable(self):
