@@ -320,3 +320,35 @@ def test_a_neighbouring_branch_moves_what_changes_at_its_boundary():
     # the boundary of the stages lies beside that of the jump
     assert all(p.branches.neighbours.zero_sides(p.run.point, n) is None for n in at_stage)
     assert any(p.branches.neighbours.zero_sides(p.run.point, n, wide=True) is not None for n in at_stage)
+
+
+@pytest.mark.parametrize('at_once, nlps', [(True, 1), (False, 2)])
+def test_with_the_decisions_of_its_sides_a_branch_takes_one_nlp(at_once, nlps):
+    p = jump_inside_a_stage()
+    w, before = p.run.point.w, len(p.kinds('branch'))
+    zero = p.subsolves.sets(w, 1e-8).zero
+    point = branch_solutions.BranchSolutions(p.subsolves, at_once).certified(w, zero, max_iter=branch_solutions.SECOND)
+    assert len(p.kinds('branch')) == before + nlps and point.certificate.certified
+    assert np.any(point.equal) and p.compiled.decided(point.w)[point.equal] == pytest.approx(0, abs=1e-8)
+
+
+@pytest.mark.parametrize('cost, found', [(0.5 * branch_solutions.AS_GOOD, True), (2 * branch_solutions.AS_GOOD, False)])
+def test_only_a_point_that_is_as_good_counts_with_fewer_variables_at_their_lower_bound(cost, found, monkeypatch):
+    p = jump_inside_a_stage()
+    point, short = p.run.point, p.compiled.neighbours[0].short
+    at_bound, off = point.w.copy(), replace(point, f=point.f + cost * max(1.0, abs(point.f)))
+    at_bound[short] = p.compiled.lbx[short]
+    assert p.branches.neighbours.number_of_short(at_bound) == p.branches.neighbours.number_of_short(point.w) + len(short) > 0
+
+    def certified(w, zero, enough, **options):
+        return off if off.f <= enough else None
+
+    monkeypatch.setattr(p.branches.solutions, 'certified', certified)
+    monkeypatch.setattr(p.branches.neighbours, 'beside_short', lambda point: [zero_of(point)])
+    assert (p.branches.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound))) is off) == found
+    # no fewer than before
+    assert p.branches.with_fewer_short(point) is None
+
+
+def zero_of(point):
+    return np.zeros(1, dtype=int)
