@@ -163,24 +163,29 @@ class Coincidences:
 
         ``inserts`` is whether places can be inserted, so that their values have a limit.
         """
-        enough = self._tolerances.descent
         with self._c.vanishing(way.extents):
-            start, equal = self._beside(point, way)
-            if start in (ABSENT, OPEN):
-                return start
-            if self._is_another(point, start):
-                return OPEN
-            gamma = np.zeros(len(way.zero), dtype=bool)
-            gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
-            sets = ActiveSets(self._subsolves.settled(start.w, way.zero), gamma)
-            w = self._subsolves.at_limit(start.w, sets.zero, way.extents, point.w[way.extents].max())
-            if w is None and inserts:
-                return OPEN
-            w = start.w if w is None else w
-            step = self._subsolves.lpec(w, sets, self._tolerances.radius, equal, multipliers=-start.lam_g, enough=enough)
+            found = self._without_extent(point, inserts, way)
+        return found if isinstance(found, str) else self._better(point, *found)
+
+    def _without_extent(self, point, inserts, way):
+        """The outcome of a way whose places have no extent; or starts and zero sides of a branch that may be better."""
+        start, equal = self._beside(point, way)
+        if start in (ABSENT, OPEN):
+            return start
+        if self._is_another(point, start):
+            # it does not show where the order leads, but it may be better
+            return (start.w,), way.zero
+        gamma = np.zeros(len(way.zero), dtype=bool)
+        gamma[way.either] = self._subsolves.sets(start.w, self._tolerances.biactive).gamma[way.either]
+        sets = ActiveSets(self._subsolves.settled(start.w, way.zero), gamma)
+        w = self._subsolves.at_limit(start.w, sets.zero, way.extents, point.w[way.extents].max())
+        if w is None and inserts:
+            return OPEN
+        w, enough = start.w if w is None else w, self._tolerances.descent
+        step = self._subsolves.lpec(w, sets, self._tolerances.radius, equal, multipliers=-start.lam_g, enough=enough)
         if not step.solved:
             return OPEN
-        return SETTLED if step.descent <= enough else self._grown(point, w, step.d, step.zero)
+        return SETTLED if step.descent <= enough else ((w + step.d, w), step.zero)
 
     def _beside(self, point, way):
         """The incumbent in the branch of a way, its places without extent, and the decisions in force; or the outcome."""
@@ -209,10 +214,10 @@ class Coincidences:
         """The decisions that involve variables: beside a place of extent zero nothing is decided, as changes lie on both sides."""
         return (self._c.gradients(w)[-1][:, variables].toarray() != 0.0).any(axis=1)
 
-    def _grown(self, point, w, d, zero):
-        """A point in the branch that is better than the incumbent; or OPEN."""
+    def _better(self, point, starts, zero):
+        """A point in the branch ``zero``, in which the places may grow, that is better than the incumbent; or OPEN."""
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
-        for start in (w + d, w):
+        for start in starts:
             found = self._branches.solutions.certified(start, zero, max_iter=SECOND, below=point.f)
             if found is not None and found.f <= enough:
                 return found
