@@ -225,6 +225,21 @@ def test_events_are_certified_where_no_slope_descends(case, kind):
     assert all(certified == minimum for certified, minimum in found)
 
 
+@pytest.mark.parametrize('early', [2e-6, 1e-3])
+def test_orders_behind_a_short_element_are_judged(early):
+    """Two relays switch at a stage, of which the first element is short: it ends where another relay has switched."""
+    found = []
+    for seed in (0, 3, 7, 18):
+        events = events_together.Events.draw_after_early_one(seed, 2, early)
+        assert min(map(abs, events.slopes)) > CLEAR
+        m = events_together.simulated(events, 'relay', 4, (0, 1, 2))
+        r = moving_grids(m)[m.t].r
+        assert r[1].value < 0.01 * r[2].value
+        found.append((pyomo_fesd.certify(m).certified, min(events.slopes) > 0))
+    assert {minimum for _, minimum in found} == {False, True}
+    assert all(certified == minimum for certified, minimum in found)
+
+
 @pytest.mark.parametrize('kind', KINDS)
 def test_two_equal_events_stay_certified(kind):
     events = events_together.Events.draw(0, 2)

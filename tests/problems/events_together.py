@@ -38,6 +38,17 @@ class Events:
         q, w = random.uniform(-1, 1, number), random.uniform(-1, 1, number)
         return cls(r, r[:, 0] * time - q, q, w)
 
+    @classmethod
+    def draw_after_early_one(cls, seed, number, early):
+        """Return a random problem with ``number`` events at 1 for theta = 1, and one more at ``early``, whatever theta is."""
+        random = np.random.default_rng(seed)
+        r = random.uniform(0.5, 3, (number + 1, 2 ** (number + 1)))
+        q, w = random.uniform(-1, 1, number + 1), random.uniform(-1, 1, number + 1)
+        q[-1] = 0.0
+        p = r[:, 0] * early + r[:, 2**number] * (1 - early) - q
+        p[-1] = r[-1, 0] * early
+        return cls(r, p, q, w)
+
     def with_last_after(self):
         """Return the problem whose last event comes after the others."""
         p = self.p.copy()
