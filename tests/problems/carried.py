@@ -10,6 +10,7 @@ import pyomo.environ as pyo
 from pyomo.gdp import Disjunction
 
 import pyomo_fesd
+from tests.problems.running import move
 
 CONTROLS, SWITCH, VALUE = (10 / 9, 5 / 9), 0.6, 50 / 27
 STUCK, STUCK_VALUE = (2 / 3, 1.0), 22 / 9
@@ -33,6 +34,16 @@ def build_with_jump(start=1.0):
     m.constant = pyo.Constraint(m.t, rule=lambda m, t: m.dk[t] == 0)
     m.distance = pyo.Constraint(m.t, rule=lambda m, t: m.dz[t] == -m.dx[t])
     m.change = pyomo_fesd.state_jump(m.t, guard=lambda m, t: m.z[t], reset=lambda m, t: [(m.k[t], 1), (m.z[t], 9)])
+    return m
+
+
+def simulated_with_jump(nfe):
+    """``build_with_jump`` on elements, simulated with the best controls."""
+    m = build_with_jump()
+    move(m, nfe, 2, piecewise_constant=[m.u])
+    for t in m.t:
+        m.u[t].value = CONTROLS[t > 1]
+    pyomo_fesd.simulate(m)
     return m
 
 

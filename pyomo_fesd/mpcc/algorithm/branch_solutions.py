@@ -76,7 +76,10 @@ class BranchSolutions:
         return float(np.abs(solved.lam_g[: len(rows)]) @ rows)
 
     def _solve(self, w, zero, duals, below, **more):
-        """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force."""
+        """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force.
+
+        With ``at_once`` only one, unless that one does not reach its solution.
+        """
         if self._at_once:
             solved, equal = self._decided_by_sides(w, zero, duals=duals, **more)
             if solved is not None and solved.solved:

@@ -154,24 +154,24 @@ class Branches:
 
         What a place of least extent holds is as small as the tolerances: the LPEC does not see that only the bound keeps it.
         """
-        enough = point.f - PROGRESS * max(1.0, abs(point.f))
+        return next(self._beside_short(point, point.f - PROGRESS * max(1.0, abs(point.f))), None)
+
+    def with_fewer_short(self, point):
+        """A certified point that is as good as ``point``, in such a branch, with fewer variables at their lower bound; or None.
+
+        Orders of changes beside a place of least extent may not be known.
+        """
+        number = self.neighbours.number_of_short(point.w)
+        others = self._beside_short(point, point.f + AS_GOOD * max(1.0, abs(point.f)))
+        fewer = (other for other in others if self.neighbours.number_of_short(other.w) < number)
+        return next((other for other in fewer if other.certificate.certified), None)
+
+    def _beside_short(self, point, enough):
+        """Yield the solutions, of at most ``enough``, of the neighbouring branches for each variable at its lower bound."""
         for zero in self.neighbours.beside_short(point):
             found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f, enough=enough)
             if found is not None:
-                return found
-        return None
-
-    def with_fewer_short(self, point):
-        """A certified point that is as good in such a branch, with fewer variables at their lower bound; None if there is none.
-
-        Orders of changes beside a place of least extent are not known.
-        """
-        enough, number = point.f + AS_GOOD * max(1.0, abs(point.f)), self.neighbours.number_of_short(point.w)
-        for zero in self.neighbours.beside_short(point):
-            found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f, enough=enough)
-            if found is not None and found.certificate.certified and self.neighbours.number_of_short(found.w) < number:
-                return found
-        return None
+                yield found
 
     def has_short(self, point) -> bool:
         """Whether a variable of ``point`` is at its lower bound, so that there are branches for ``without_short``."""

@@ -10,7 +10,7 @@ possible beside the point; if they are, the LPEC with the copies shows whether e
 
 Takes: a point, and zero sides of the copies and of the part after them.
 Leaves: a ``Verdict``.
-Does not apply: where the values of a copy have no limit; between parts of nearly no extent; with fillings.
+Does not apply: where the values of a copy have no limit; beside parts of nearly no extent; with fillings.
 
 Values that the equations do not determine, as controls that vary within parts, are those of the part before or after the copy, and
 both must give the same verdict: stationarity is a local notion for them too.
@@ -114,7 +114,7 @@ class Insertions:
         k, part = insertion.k, self._parts.all[insertion.k]
         # the copy of a part whose first values are given begins with them
         begins = self._parts.is_whole(k) or (part.alike and insertion.ahead and not grows)
-        return begins and not (self._parts.ends_with_pairs(k) or self._parts.is_between_short_ones(w, k, insertion.ahead))
+        return begins and not (self._parts.ends_with_pairs(k) or self._parts.touches_a_short_one(w, k, insertion.ahead))
 
     @staticmethod
     def _by_values(w, insertion, copy, guess):

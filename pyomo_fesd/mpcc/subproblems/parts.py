@@ -58,8 +58,8 @@ class Parts:
         beside = self._extents(w, k - 1, k, k + 1)
         return min(beside) < SHORT * max(beside)
 
-    def is_between_short_ones(self, w, k, ahead):
-        """Whether part ``k``, or the one on the other side of its beginning (``ahead``) or end, has nearly no extent."""
+    def touches_a_short_one(self, w, k, ahead):
+        """Whether one of the two parts that meet at the beginning (``ahead``) or the end of part ``k`` has nearly no extent."""
         return min(self._extents(w, k, k - 1 if ahead else k + 1)) < SHORT * max(self._extents(w, k - 1, k, k + 1))
 
     def _extents(self, w, *numbers):

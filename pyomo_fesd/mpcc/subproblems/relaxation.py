@@ -109,7 +109,7 @@ class Relaxation:
         """Solve from ``w``, with the multipliers of an earlier result of this form if given."""
         c = self._c
         lbx, ubx, lbg, ubg = c.lbx.copy(), c.guide_ubx.copy(), self._lbg.copy(), self._ubg.copy()
-        # such are distances that are zero; fixing shares that are one leads the path elsewhere and gains nothing
+        # such are distances that are zero; with shares that are one fixed too, a path of nosbench ended in a worse minimum
         fix_single(c, w, lbx, ubx, lbg, ubg, least_only=True)
         if self._slack:
             at = c.evaluate(w)

@@ -7,10 +7,8 @@ import pyomo.environ as pyo
 import pytest
 from problems import carried, mpcc_collection, small_mpccs
 from problems.parts import parts
-from problems.running import move
 from pyomo.mpec import Complementarity, complements
 
-import pyomo_fesd
 from pyomo_fesd.core import BranchConstraint, homotopy_hints
 from pyomo_fesd.mpcc.algorithm import branch_solutions, branches
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Stop
@@ -303,12 +301,7 @@ def test_from_a_branch_that_did_not_end_only_large_steps_are_worth_it(monkeypatc
 
 def jump_inside_a_stage():
     """A state jump at t = 0.6, at the second of two inner boundaries of the first control stage; simulated."""
-    m = carried.build_with_jump()
-    move(m, 6, 2, piecewise_constant=[m.u])
-    for t in m.t:
-        m.u[t].value = carried.CONTROLS[t > 1]
-    pyomo_fesd.simulate(m)
-    p = parts(m)
+    p = parts(carried.simulated_with_jump(6))
     p.branches.explore_from(p.compiled.x0, False)
     return p
 
@@ -344,11 +337,7 @@ def test_only_a_point_that_is_as_good_counts_with_fewer_variables_at_their_lower
         return off if off.f <= enough else None
 
     monkeypatch.setattr(p.branches.solutions, 'certified', certified)
-    monkeypatch.setattr(p.branches.neighbours, 'beside_short', lambda point: [zero_of(point)])
+    monkeypatch.setattr(p.branches.neighbours, 'beside_short', lambda point: [np.zeros(1, dtype=int)])
     assert (p.branches.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound))) is off) == found
     # no fewer than before
     assert p.branches.with_fewer_short(point) is None
-
-
-def zero_of(point):
-    return np.zeros(1, dtype=int)

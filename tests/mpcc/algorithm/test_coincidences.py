@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from problems import carried
 from problems.parts import parts
-from problems.running import move
 
-import pyomo_fesd
 from pyomo_fesd.mpcc.algorithm.arrivals import Entered
 from pyomo_fesd.mpcc.algorithm.coincidences import OPEN, Coincidences
 
@@ -17,12 +15,7 @@ NONE = np.zeros(0, dtype=int)
 
 @pytest.mark.parametrize('gain, better', [(0.1, True), (-0.1, False)])
 def test_another_solution_with_a_spare_place_is_gone_on_from_if_it_is_better(gain, better, monkeypatch):
-    m = carried.build_with_jump()
-    move(m, 6, 2, piecewise_constant=[m.u])
-    for t in m.t:
-        m.u[t].value = carried.CONTROLS[t > 1]
-    pyomo_fesd.simulate(m)
-    p = parts(m)
+    p = parts(carried.simulated_with_jump(6))
     p.branches.explore_from(p.compiled.x0, False)
     point, coincidences, bounds = p.run.point, Coincidences(p.subsolves, p.branches), p.compiled.lbx.copy()
     extent = p.compiled.neighbours[0].short

@@ -84,9 +84,9 @@ def test_what_is_given_in_the_part_before_is_not_followed():
 
 
 @pytest.mark.parametrize('short', [0, 1, 2])
-def test_a_place_is_between_short_parts_where_one_of_its_two_neighbours_is(short):
+def test_a_place_touches_a_short_part_where_one_of_its_two_neighbours_is(short):
     parts, w = of_hand(places=ONE_CHAIN), np.ones(13)
     w[PARTS[short][0]] = 1e-6
-    assert [parts.is_between_short_ones(w, k, ahead=False) for k in range(3)] == [short in (k, k + 1) for k in range(3)]
-    assert [parts.is_between_short_ones(w, k, ahead=True) for k in range(3)] == [short in (k - 1, k) for k in range(3)]
+    assert [parts.touches_a_short_one(w, k, ahead=False) for k in range(3)] == [short in (k, k + 1) for k in range(3)]
+    assert [parts.touches_a_short_one(w, k, ahead=True) for k in range(3)] == [short in (k - 1, k) for k in range(3)]
     assert [parts.is_beside_a_short_one(w, k) for k in range(3)] == [abs(short - k) <= 1 for k in range(3)]
