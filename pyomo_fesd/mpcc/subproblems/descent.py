@@ -18,6 +18,8 @@ from pyomo_fesd.mpcc.compile import major_index
 
 #: Terms below this part of the objective's largest gradient entry (or change of it) over the reach are round-off.
 FLOOR = 1e-8
+#: A multiplier with the wrong sign is round-off below this part of the largest one.
+WRONG_SIGN = 1e-9
 #: Smaller sizes are zero.
 SMALLEST = 1e-200
 
@@ -58,6 +60,39 @@ class Descent:
         by_rows = _ratios(rows, extent, floor) * np.minimum(of_rows, 1.0)
         return float(max(by_columns.max(initial=0.0), by_rows.max(initial=0.0)))
 
+    def proved_of_sums(self, y, steps, clipped) -> tuple[float, float]:
+        """``proved`` and ``least`` at their worst, of multipliers ``y`` plus any of the ``steps``, each or not.
+
+        Parameters
+        ----------
+        clipped : array (m)
+            by how much multipliers have the wrong sign for a bound that their rows have with some of the sums only; they are set to
+            zero, and where that is more than round-off nothing is proved
+        """
+        p = self._p
+        m, A, row = len(y), p.A, major_index(p.A)
+        entries, along = np.abs(A.data), [self._by_columns(A.data * step[row]) for step in steps]
+        y_low, y_high = _between(y, steps)
+        clipped = clipped + np.where(np.isneginf(p.low), np.maximum(y_high, 0.0), 0.0)
+        clipped = clipped + np.where(np.isposinf(p.high), np.maximum(-y_low, 0.0), 0.0)
+        if clipped.max(initial=0.0) > WRONG_SIGN * np.abs(y).max(initial=0.0):
+            return np.inf, -np.inf
+        lost = self._by_columns(entries * clipped[row])
+        low, high = _between(p.cost - self._by_columns(A.data * y[row]), [-part for part in along])
+        columns = np.maximum(-_least(low - lost, p.lower, p.upper), -_least(high + lost, p.lower, p.upper))
+        y_low = np.where(np.isposinf(p.high), np.maximum(y_low, 0.0), y_low)
+        y_high = np.where(np.isneginf(p.low), np.minimum(y_high, 0.0), y_high)
+        slack = np.maximum(np.where(y_high > 0, -p.low, 0.0), np.where(y_low < 0, p.high, 0.0))
+        most = np.maximum(np.abs(y_low), np.abs(y_high))
+        least = np.where(y_low * y_high > 0, np.minimum(np.abs(y_low), np.abs(y_high)), 0.0)
+        size = (np.abs(p.cost) + self._by_columns(entries * least[row]) + self._least_curvature(y, steps)) * p.reach
+        floor, rows = FLOOR * self._reach_of_objective(), most * slack
+        of_rows = np.zeros(m)
+        np.maximum.at(of_rows, row, entries * most[row] * (p.reach / np.maximum(size, SMALLEST))[A.indices])
+        by_rows = _ratios(rows, most * np.bincount(row, entries * p.reach[A.indices], m), floor) * np.minimum(of_rows, 1.0)
+        by_columns = np.where(columns > floor, columns / np.maximum(size, SMALLEST), 0.0)
+        return float(max(by_columns.max(initial=0.0), by_rows.max(initial=0.0))), -float(columns.sum() + rows.sum())
+
     def least(self, y) -> float:
         """The lower bound of the program's value that multipliers ``y`` prove."""
         _, columns, rows = self._bounds(y)
@@ -77,6 +112,17 @@ class Descent:
         reduced = p.cost - np.bincount(p.A.indices, p.A.data * y[major_index(p.A)], len(p.cost))
         return y, -_least(reduced, p.lower, p.upper), -_least(y, p.low, p.high)
 
+    def _by_columns(self, numbers):
+        """Sums over the entries of each column."""
+        return np.bincount(self._p.A.indices, numbers, len(self._p.cost))
+
+    def _least_curvature(self, y, steps):
+        """The least that ``_curvature`` may be of ``y`` plus any of the ``steps``."""
+        found = np.zeros(len(self._p.cost))
+        for cost, of_rows in self._known_changes():
+            found = np.maximum(found, np.abs(cost - of_rows(y)) - sum(np.abs(of_rows(step)) for step in steps))
+        return found
+
     def _curvature(self, y):
         along = [np.abs(cost - of_rows(y)) for cost, of_rows in self._known_changes()]
         return np.max(along, axis=0) if along else 0.0
@@ -89,6 +135,11 @@ class Descent:
         if self._known is None:
             self._known = self._changes()
         return self._known
+
+
+def _between(at, steps):
+    """The least and the largest sums of ``at`` and any of the ``steps``, elementwise."""
+    return at + sum(np.minimum(step, 0.0) for step in steps), at + sum(np.maximum(step, 0.0) for step in steps)
 
 
 def _ratios(terms, sizes, floor):

@@ -82,7 +82,8 @@ class EndInsertions:
         if not joined.applies(*joined.gradients(values.points)):
             return None
         base, limits = joined.with_end(base, there), values.limits(radius)
-        return joined.best(self._lpec, sets, base, values.points, credits, [limits], [values.fixed])
+        limits, fixed, enough = [limits], [values.fixed], self._tolerances.descent
+        return joined.searched(self._lpec, sets, base, values.points, credits, limits, fixed, enough)
 
 
 class JoinedAtEnd(JoinedLpec):

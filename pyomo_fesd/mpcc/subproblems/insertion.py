@@ -177,7 +177,7 @@ class Insertions:
             return None
         base, points = joined.with_following(base, there), (w, beside, *limits)
         bounds, fixed = zip(*((copy.limits(radius), copy.fixed) for copy in copies))
-        return joined.best(self._lpec, sets, base, points, credits, bounds, fixed)
+        return joined.searched(self._lpec, sets, base, points, credits, bounds, fixed, self._tolerances.descent)
 
 
 def _of_rest(verdict):

@@ -104,15 +104,15 @@ class JoinedLpec:
         change = np.abs(there - here)[ends] > SAME * sizes_of(here[ends])
         return sums and not np.any(matter & change)
 
-    def best(self, lpec, sets, base, points, credits, limits, fixed):
-        """The best direction of the LPEC with the copies, which grow at the ``credits`` more for each unit.
+    def searched(self, lpec, sets, base, points, credits, limits, fixed, enough):
+        """A direction of the LPEC with the copies, which grow at the ``credits`` more for each unit; see ``Lpec.searched``.
 
         The first of the ``points`` is the one without copies; ``limits`` and variables that are ``fixed`` are those of each copy.
         """
         base = replace(base, program=self._unfixed(lpec, points[0], sets, base.program))
         at = self.linearised(base, self.gradients(points), credits, limits, fixed)
         descent = Descent(at.program, lambda: [(cost, A.T.dot) for cost, A in self.changes(*map(lpec.changes, points))])
-        return lpec.best(sets, at, descent, True)
+        return lpec.searched(sets, at, descent, enough)
 
     def linearised(self, base, points, credits, limits, fixed):
         """The LPEC with the copies, without its binaries."""

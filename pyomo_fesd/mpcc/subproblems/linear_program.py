@@ -32,10 +32,7 @@ GAPS = {'mip_abs_gap': 1e-9, 'mip_rel_gap': 1e-6}
 #: d = 0 is a first solution; to search for one takes most of the time of a small program, and so do smaller programs with binaries
 #: that HiGHS solves at the root for a better one.
 STARTED = {f'mip_heuristic_run_{name}': False for name in ('feasibility_jump', 'rins', 'rens', 'root_reduced_cost')}
-ENDED_WELL = (highspy.HighsModelStatus.kOptimal, highspy.HighsModelStatus.kObjectiveTarget)
 LIMITED = (highspy.HighsModelStatus.kSolutionLimit, highspy.HighsModelStatus.kIterationLimit, highspy.HighsModelStatus.kTimeLimit)
-#: Branch and bound ends at a direction with this descent, where the largest entry of the cost descends by 1.
-CLEAR_DESCENT = 1e-3
 #: A point of HiGHS may miss equilibrated rows by this, and its value the bound by this.
 RESIDUAL, GAP = 1e-6, 1e-6
 #: Smaller entries, in rows whose columns reach 1, are noise; HiGHS drops them too.
@@ -82,7 +79,7 @@ class Answer:
     y: object
 
 
-def solve(program, options, deadline, start=None, clear=False, limits=None):
+def solve(program, options, deadline, start=None, limits=None):
     """The ``Answer`` of HiGHS, or None without one that holds.
 
     Parameters
@@ -92,23 +89,18 @@ def solve(program, options, deadline, start=None, clear=False, limits=None):
         of the user
     deadline : Deadline
     start : array, optional
-    clear : bool
-        whether a clear descent may end branch and bound
     limits : dict, optional
         HiGHS options of a single attempt; when one of them ends the search, the best point so far is taken
     """
     p, rows, factor = program.equilibrated()
     limits = limits or {}
     for attempt in _attempts(p):
-        highs = highspy.Highs()
-        for name, option in _settings(attempt, p.binaries, clear, deadline, limits | options).items():
-            highs.setOptionValue(name, option)
-        highs.passModel(_highs_model(p))
+        highs = highs_of(p, settings_of(attempt, p.binaries, deadline, limits | options))
         if start is not None:
             guess = highspy.HighsSolution()
             guess.col_value = list(start / program.reach)
             highs.setSolution(guess)
-        _run(highs)
+        run(highs)
         answer = _answer(highs, p, bool(limits))
         if answer is not None:
             y = None if answer.y is None else answer.y * rows / factor
@@ -116,6 +108,15 @@ def solve(program, options, deadline, start=None, clear=False, limits=None):
         if limits:
             return None
     return None
+
+
+def highs_of(p, settings):
+    """HiGHS with an equilibrated program and these settings."""
+    highs = highspy.Highs()
+    for name, option in settings.items():
+        highs.setOptionValue(name, option)
+    highs.passModel(_highs_model(p))
+    return highs
 
 
 def refusal(options: dict) -> str | None:
@@ -135,11 +136,11 @@ def infeasible(program) -> bool:
     highs.setOptionValue('output_flag', False)
     highs.setOptionValue('threads', THREADS['threads'])
     highs.passModel(_highs_model(program.equilibrated()[0]))
-    _run(highs)
+    run(highs)
     return highs.getModelStatus() == highspy.HighsModelStatus.kInfeasible
 
 
-def _run(highs):
+def run(highs):
     """Run HiGHS, also where the last run in this thread, perhaps of another tool, had another number of threads.
 
     HiGHS refuses such a run with the same error as a start from which its simplex method cannot go on; the second run has none.
@@ -156,17 +157,17 @@ def _answer(highs, p, limited):
     """HiGHS' answer to the equilibrated program; None where it did not end or does not hold."""
     status, solution = highs.getModelStatus(), highs.getSolution()
     stopped = limited and status in LIMITED and solution.value_valid
-    if not (status in ENDED_WELL or stopped):
+    if not (status == highspy.HighsModelStatus.kOptimal or stopped):
         return None
     d = np.array(solution.col_value)
-    optimal = p.binaries and status == highspy.HighsModelStatus.kOptimal
-    if not _holds(p, d) or (optimal and not _bounded(highs, p.cost @ d)):
+    optimal = p.binaries and not stopped
+    if not holds(p, d) or (optimal and not _bounded(highs, p.cost @ d)):
         return None
     y = np.array(solution.row_dual) if not p.binaries and solution.dual_valid else None
     return Answer(np.clip(d, p.lower, p.upper), y)
 
 
-def _holds(p, d):
+def holds(p, d):
     """Whether a point satisfies rows and bounds."""
     activity = p.A @ d
     misses = (p.low - activity, activity - p.high, p.lower - d, d - p.upper)
@@ -186,12 +187,12 @@ def _attempts(p):
     return [limit | attempt for attempt in ATTEMPTS[:-1]] + list(ATTEMPTS[-1:])
 
 
-def _settings(attempt, binaries, clear, deadline, given):
+def settings_of(attempt, binaries, deadline, given):
     """HiGHS options of one attempt; those that are ``given`` override ours, except for the deadline."""
     settings = {'output_flag': False} | THREADS | {name: value for name, value in attempt.items() if name != 'tolerance'}
     if binaries:
         settings.pop('solver', None)
-        settings |= GAPS | STARTED | ({'objective_target': -CLEAR_DESCENT} if clear else {})
+        settings |= GAPS | STARTED
     settings |= dict.fromkeys(TOLERANCES, attempt['tolerance']) | given
     if deadline.at is not None:
         settings['time_limit'] = min(settings.get('time_limit', np.inf), deadline.left())

@@ -21,6 +21,7 @@ terms.  It is no proof against the point, but worth a look (``LpecResult.matters
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import attrgetter
 
 import numpy as np
 from scipy import sparse
@@ -30,6 +31,7 @@ from pyomo_fesd.mpcc.nlp import Deadline, check_options
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO
 from pyomo_fesd.mpcc.subproblems.descent import Descent
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, refusal, solve
+from pyomo_fesd.mpcc.subproblems.pair_search import PairSearch, with_sides
 from pyomo_fesd.mpcc.subproblems.side_constraints import release_followers, without_constant
 
 #: A relative descent beyond positive sides of fillings counts from here: those of two places differ by the error of a method.
@@ -120,8 +122,7 @@ class Lpec:
         multipliers : array, optional
             of the branch's rows, positive at lower bounds, to try weak duality with
         enough : float, optional
-            a relative descent of at most this does not count: weak duality may end the search, and without ``limits`` a clear
-            descent branch and bound
+            a relative descent of at most this does not count, and any other one ends the search
         limits : dict, optional
             HiGHS options of a call that proves nothing; when one of them ends the search, the best direction so far is taken
         """
@@ -138,13 +139,14 @@ class Lpec:
         rows = np.concatenate(row_places(sets, equal, len(self._c.lbg)))
         descent = Descent(at.program, lambda: [(cost, partial(_product, A, rows)) for cost, A in self.changes(w)])
         if enough is None:
-            return self.best(sets, at, descent, False, limits)
+            return self.best(sets, at, descent, limits)
         if multipliers is not None:
             y = self._row_multipliers(multipliers, sets, equal)
             if descent.proved(y) <= enough and not self._matters(w, descent, descent.least(y)):
                 return LpecResult(True, 0.0, np.zeros(len(w)), sets.zero, 0)
-        found = self.best(sets, at, descent, limits is None, limits)
-        return replace(found, matters=found.descent <= enough and self._matters(w, descent, found.value))
+        matters = partial(self._matters, w, descent)
+        found = self.best(sets, at, descent, limits) if limits else self.searched(sets, at, descent, enough, matters)
+        return replace(found, matters=found.descent <= enough and matters(found.value))
 
     def _matters(self, w, descent, value):
         return -value > MATTERS * abs(self._c.evaluate(w).f) and not descent.negligible(value, LEFT)
@@ -158,12 +160,35 @@ class Lpec:
         sets = without_constant(sets, self._sides, (lower == 0.0) & (upper == 0.0))
         return sets, equal, self._linearised(w, sets, equal, reach, lower, upper, released)
 
-    def best(self, sets, at, descent, clear, limits=None) -> LpecResult:
-        """The best direction of a linearised LPEC and its relative descent."""
-        found = self._mixed_integer(sets, at, clear, limits)
+    def searched(self, sets, at, descent, enough, matters=lambda value: False) -> LpecResult:
+        """A direction of a linearised LPEC that descends by more than ``enough``, or the proof that there is none.
+
+        Without one the result is that of the branch whose value ``matters`` most, if there is one.
+        """
+        p, pairs = at.program, int(sets.gamma.sum())
+        none = LpecResult(True, 0.0, np.zeros(len(p.cost)), sets.zero, pairs)
+
+        def branch(sides, answer):
+            zero = sets.zero.copy()
+            zero[sets.gamma] = sides
+            found = self._within_branch(at, zero, sides, descent, answer)
+            return replace(found, descent=0.0) if descent.negligible(found.value) else found
+
+        search = PairSearch(p, pairs, descent, enough, matters, branch, self._options, self._deadline)
+        found = search.run()
+        if found is None and search.is_open:
+            return replace(none, solved=False)
+        return found or min((other for other in search.others if matters(other.value)), key=attrgetter('value'), default=none)
+
+    def best(self, sets, at, descent, limits=None) -> LpecResult:
+        """The best direction of a linearised LPEC and its relative descent, as HiGHS finds it with a binary for each pair."""
+        found = self._mixed_integer(sets, at, limits)
         if not found.solved or descent.negligible(found.value):
             return found
-        return self._within_branch(at, sets, found, descent, limits)
+        answer = solve(with_sides(at.program, found.zero[sets.gamma]), self._options, self._deadline, limits=limits)
+        if answer is None or answer.y is None:
+            return replace(found, descent=-found.value / float(np.abs(at.program.cost) @ at.program.reach))
+        return self._within_branch(at, found.zero, found.zero[sets.gamma], descent, answer)
 
     def _linearised(self, w, sets, equal, reach, lower, upper, released):
         c = self._c
@@ -220,7 +245,7 @@ class Lpec:
         undecided = [G[sets.open], H[sets.open], G[sets.gamma], H[sets.gamma]]
         return np.concatenate([lam[:m], *sides, decided[equal], *undecided])
 
-    def _mixed_integer(self, sets, at, clear, limits):
+    def _mixed_integer(self, sets, at, limits):
         """With a binary for each bi-active pair: G + grad G d - M y <= 0  and  H + grad H d + M y <= M."""
         p, n, y = at.program, len(at.program.cost), int(sets.gamma.sum())
         A, high = p.A, p.high
@@ -240,25 +265,19 @@ class Lpec:
             y,
         )
         start = np.concatenate([np.zeros(n), (sets.zero[sets.gamma] == H_ZERO).astype(float)])
-        answer = solve(program, self._options, self._deadline, start, clear, limits)
+        answer = solve(program, self._options, self._deadline, start, limits)
         zero = sets.zero.copy()
         if answer is None:
             return LpecResult(False, 0.0, np.zeros(n), zero, y)
         zero[sets.gamma] = np.where(answer.d[n:] > 0.5, H_ZERO, G_ZERO)
         return LpecResult(True, min(float(p.cost @ answer.d[:n]), 0.0), answer.d[:n], zero, y)
 
-    def _within_branch(self, at, sets, found, descent, limits):
-        """``found`` with the best direction of its branch and its relative descent, which the multipliers of this LP show."""
-        p, chosen, y = at.program, found.zero[sets.gamma], int(sets.gamma.sum())
-        high = p.high.copy()
-        high[len(high) - 2 * y :] = np.where(np.concatenate([chosen == G_ZERO, chosen == H_ZERO]), 0.0, np.inf)
-        branch = replace(p, high=high)
-        answer = solve(branch, self._options, self._deadline, limits=limits)
-        if answer is None or answer.y is None:
-            return replace(found, descent=-found.value / float(np.abs(p.cost) @ p.reach))
-        value = min(float(p.cost @ answer.d), 0.0)
-        measured = descent.of(branch).proved(answer.y)
-        return replace(found, value=value, d=answer.d, descent=measured)
+    @staticmethod
+    def _within_branch(at, zero, sides, descent, answer):
+        """The result of the best direction of branch ``zero``, whose multipliers show the relative descent."""
+        p = at.program
+        measured = descent.of(with_sides(p, sides)).proved(answer.y)
+        return LpecResult(True, min(float(p.cost @ answer.d), 0.0), answer.d, zero, len(sides), measured)
 
 
 def _product(A, rows, y):

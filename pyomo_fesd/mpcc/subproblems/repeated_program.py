@@ -1,0 +1,104 @@
+"""A linear program that is solved again and again, with other upper bounds of its rows, each time from the last basis.
+
+Takes: a program without binaries.
+Leaves: its optimum; or a point and multipliers as HiGHS gave them, of which nothing is promised.
+"""
+
+from dataclasses import replace
+
+import highspy
+import numpy as np
+
+from pyomo_fesd.mpcc.subproblems.linear_program import ATTEMPTS, Answer, highs_of, holds, run, settings_of, solve
+
+#: Iterations of the simplex method before the next attempt, for each row and column: without a basis, and from the last one.
+FIRST, AGAIN = 1.0, 0.1
+#: Ways to multipliers where the simplex method does not end.
+OTHERWISE = {'solver': 'ipm', 'run_crossover': 'off'}, {'presolve': 'on'}
+
+
+class RepeatedProgram:
+    """One program in HiGHS.
+
+    Parameters
+    ----------
+    program : Program
+    options : dict
+        of the user
+    deadline : Deadline
+    """
+
+    def __init__(self, program, options, deadline):
+        self._given, self._options, self._deadline = program, options, deadline
+        self._p, self._rows, self._factor = program.equilibrated()
+        self._high, self._limit = self._p.high, FIRST
+        self._highs, self._basis = self._made({}), None
+
+    def solve(self, high):
+        """An ``Answer`` with the upper bounds ``high`` of the rows, of which nothing is promised; None where HiGHS has none."""
+        answer = self._from_last_basis(high)
+        return self._otherwise() if answer is None else answer
+
+    def optimum(self, high):
+        """The ``Answer`` that is optimal with the upper bounds ``high`` and holds, or None."""
+        answer = self._from_last_basis(high)
+        if answer is not None and holds(replace(self._p, high=self._high), answer.d / self._given.reach):
+            return answer
+        return solve(replace(self._given, high=high), self._options, self._deadline)
+
+    def _from_last_basis(self, high):
+        high = high * self._rows
+        changed = np.flatnonzero(high != self._high)
+        self._high = high
+        self._change(self._highs, changed)
+        if self._deadline.at is not None:
+            # the limit is one of all runs together
+            self._highs.setOptionValue('time_limit', self._highs.getRunTime() + self._deadline.left())
+        self._highs.setOptionValue('simplex_iteration_limit', int(self._limit * sum(self._p.A.shape)))
+        if self._ends_well(self._highs):
+            self._limit, self._basis = AGAIN, self._highs.getBasis()
+            return self._answer(self._highs)
+        # the basis in which it ended leads nowhere
+        self.restart(self._basis)
+        return None
+
+    @property
+    def basis(self):
+        """That of the last optimum from the basis before; None before the first one."""
+        return self._basis
+
+    def restart(self, basis):
+        """Begin with another basis."""
+        if basis is None:
+            self._highs.clearSolver()
+        else:
+            self._highs.setBasis(basis)
+
+    def _otherwise(self):
+        for settings in OTHERWISE:
+            highs = self._made(settings)
+            self._change(highs, np.flatnonzero(self._high != self._p.high))
+            self._ends_well(highs)
+            answer = self._answer(highs)
+            if answer is not None:
+                return answer
+        return None
+
+    def _made(self, settings):
+        return highs_of(self._p, settings_of(ATTEMPTS[0], 0, self._deadline, settings | self._options))
+
+    def _change(self, highs, rows):
+        for i in rows:
+            highs.changeRowBounds(int(i), self._p.low[i], self._high[i])
+
+    @staticmethod
+    def _ends_well(highs):
+        run(highs)
+        return highs.getModelStatus() == highspy.HighsModelStatus.kOptimal
+
+    def _answer(self, highs):
+        solution = highs.getSolution()
+        if not (solution.value_valid and solution.dual_valid):
+            return None
+        d, y = np.array(solution.col_value) * self._given.reach, np.array(solution.row_dual) * self._rows / self._factor
+        return Answer(d, y) if np.isfinite(d).all() and np.isfinite(y).all() else None
