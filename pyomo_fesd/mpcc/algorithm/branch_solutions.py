@@ -4,9 +4,13 @@ Takes: values near a branch and its zero sides.
 Leaves: a ``Point``; None where the branch has no solution.
 """
 
+from dataclasses import dataclass
+from typing import Optional
+
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Stop
+from pyomo_fesd.mpcc.nlp import NlpResult
 
 #: Iterations of the first and of the second attempt; and how many more if they only lead to a feasible point (None: no limit).
 FIRST, SECOND = 30, 100
@@ -18,6 +22,21 @@ AS_GOOD = 1e-4
 #: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
 #: one it came from an unbounded relaxation.
 UNBOUNDED = 1e15
+
+
+@dataclass
+class _Solution:
+    """What the NLPs of a branch have found; its certificate is made when it is first needed.
+
+    ``f`` is the objective, infinite without a solution.  A branch ``is_left`` after the first NLP, whose objective this is then, if
+    that is clearly above another one.
+    """
+
+    f: float = np.inf
+    is_left: bool = False
+    nlp: Optional[NlpResult] = None
+    equal: object = None
+    certificate: object = None
 
 
 class BranchSolutions:
@@ -43,32 +62,35 @@ class BranchSolutions:
         From the same values the same branch is solved once: neighbours of points that hardly differ lead to it again and again.
         """
         if duals is not None or 'box' in more:
-            return self._certified(w, zero, duals, below, enough, **more)
+            return self._point(self._solution(w, zero, duals, below, **more), below, enough)
         key = hash((w.tobytes(), zero.tobytes(), self._c.lbx.tobytes(), self._c.ubx.tobytes(), *sorted(more.items())))
-        found, least = self._known.get(key, (None, -np.inf))
-        if found is None and min(below, enough) > least:
-            found = self._certified(w, zero, duals, below, enough, **more)
-            self._known[key] = found, min(below, enough)
-        return None if found is None or _is_clearly_above(found.f, below) or found.f > enough else found
+        found = self._known.get(key)
+        if found is None or (found.is_left and not _is_clearly_above(found.f, below)):
+            self._known[key] = found = self._solution(w, zero, duals, below, **more)
+        return self._point(found, below, enough)
 
-    def _certified(self, w, zero, duals, below, enough, **more):
-        solved, equal = self._solve(w, zero, duals, below, **more)
-        if solved is not None and not solved.solved and more.get('max_iter') in MORE:
+    def _point(self, found, below, enough):
+        if found.nlp is None or _is_clearly_above(found.f, below) or found.f > enough:
+            return None
+        if found.certificate is None:
+            found.certificate = self._subsolves.certify(found.nlp, found.equal)
+        return Point(found.nlp, found.f, found.certificate, found.equal) if found.certificate.feasible else None
+
+    def _solution(self, w, zero, duals, below, **more):
+        found = self._solve(w, zero, duals, below, **more)
+        if found.nlp is not None and not found.nlp.solved and more.get('max_iter') in MORE:
             # feasible, so the branch has a solution, but not at its minimum yet
-            again, decided = self._solve(solved.w, zero, solved, below, **more | {'max_iter': MORE[more['max_iter']]})
-            solved, equal = (solved, equal) if again is None else (again, decided)
-        if solved is None:
-            return None
-        f = self._c.evaluate(solved.w).f
-        if np.abs(solved.w).max(initial=0.0) > UNBOUNDED:
-            if f < self._c.evaluate(self._c.x0).f:
+            again = self._solve(found.nlp.w, zero, found.nlp, below, **more | {'max_iter': MORE[more['max_iter']]})
+            found = found if again.nlp is None else again
+        if found.nlp is None:
+            return found
+        found.f = self._c.evaluate(found.nlp.w).f
+        if np.abs(found.nlp.w).max(initial=0.0) > UNBOUNDED:
+            if found.f < self._c.evaluate(self._c.x0).f:
                 raise Stop(Outcome.UNBOUNDED)
-            return None
-        f += self._owed(solved)
-        if _is_clearly_above(f, below) or f > enough:
-            return None
-        certificate = self._subsolves.certify(solved, equal)
-        return Point(solved, f, certificate, equal) if certificate.feasible else None
+            return _Solution()
+        found.f += self._owed(found.nlp)
+        return found
 
     def _owed(self, solved):
         """What the objective owes to violated rows, by their multipliers: no progress, though the rows hold to the tolerances."""
@@ -83,13 +105,15 @@ class BranchSolutions:
         if self._at_once:
             solved, equal = self._decided_by_sides(w, zero, duals=duals, **more)
             if solved is not None and solved.solved:
-                return solved, equal
+                return _Solution(nlp=solved, equal=equal)
         first = self._subsolves.attempt(w, zero, None, 1.0, duals=duals, **more)
         if first is not None and not self._subsolves.usable(first):
-            return self._decided_at_once(w, zero, first, **more)
-        if first is not None and first.solved and _is_clearly_above(self._c.evaluate(first.w).f, below):
-            return None, None
-        return self.decided(first, zero, **more)
+            solved, equal = self._decided_at_once(w, zero, first, **more)
+        elif first is not None and first.solved and _is_clearly_above(self._c.evaluate(first.w).f, below):
+            return _Solution(self._c.evaluate(first.w).f, is_left=True)
+        else:
+            solved, equal = self.decided(first, zero, **more)
+        return _Solution(nlp=solved, equal=equal)
 
     def _decided_at_once(self, w, zero, first, **more):
         """One NLP with the decisions that the sides of the branch ask for, after an attempt ``first`` without them that came near.

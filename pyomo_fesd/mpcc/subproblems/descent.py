@@ -44,6 +44,16 @@ class Descent:
         other._known = self._known
         return other
 
+    def with_rows(self, program, own):
+        """The same for a program with more rows, which never change; ``own(y)`` are the multipliers of the others."""
+        return Descent(
+            program, lambda: [(cost, lambda y, of_rows=of_rows: of_rows(own(y))) for cost, of_rows in self._known_changes()]
+        )
+
+    def value(self, d) -> float:
+        """The change of the objective along ``d``."""
+        return float(self._p.cost @ d)
+
     def proved(self, y) -> float:
         """The largest relative descent that multipliers ``y`` (rows, positive at ``low``) leave possible."""
         p = self._p

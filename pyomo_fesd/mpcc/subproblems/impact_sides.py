@@ -37,11 +37,29 @@ def give_interior(c, zero, lbx, ubx, lbg, ubg):
             ubx[impact.above], lbx[impact.below], lbg[impact.room] = 0.0, -np.inf, -np.inf
         if ubx[impact.below] == 0.0:
             lbg[impact.room] = -np.inf
+    settle_drifts(c, ubx == 0.0, lbx, ubx, lbg, ubg)
+
+
+def settle_drifts(c, is_zero, lower, upper, low, high):
+    """Fix the drift of an open element, or the rate of a closed one, and free their weighted equation, in place (eq. 22).
+
+    Parameters
+    ----------
+    is_zero : bool array (n)
+        variables that are 0
+    lower, upper, low, high : arrays
+        bounds of variables and rows
+    """
     for drift in c.drifts:
-        gone = drift.drift if not np.any(ubx[drift.forces]) else drift.rate if not np.any(ubx[drift.distances]) else None
-        if gone is not None:
-            lbx[gone] = ubx[gone] = 0.0
-            lbg[drift.row], ubg[drift.row] = -np.inf, np.inf
+        j = gone(drift, is_zero)
+        if j is not None:
+            lower[j] = upper[j] = 0.0
+            low[drift.row], high[drift.row] = -np.inf, np.inf
+
+
+def gone(drift, is_zero):
+    """What is zero of a drift and its rate, where its forces or its distances are: a variable, or None."""
+    return drift.drift if np.all(is_zero[drift.forces]) else drift.rate if np.all(is_zero[drift.distances]) else None
 
 
 def _touched(impact, ubx):

@@ -30,8 +30,10 @@ from pyomo_fesd.mpcc.compile import LastPoints, major_index, with_entries
 from pyomo_fesd.mpcc.nlp import Deadline, check_options
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO
 from pyomo_fesd.mpcc.subproblems.descent import Descent
+from pyomo_fesd.mpcc.subproblems.impact_sides import settle_drifts
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, refusal, solve
-from pyomo_fesd.mpcc.subproblems.pair_search import PairSearch, with_sides
+from pyomo_fesd.mpcc.subproblems.pair_program import PairProgram, undecided
+from pyomo_fesd.mpcc.subproblems.pair_search import PairSearch
 from pyomo_fesd.mpcc.subproblems.side_constraints import release_followers, without_constant
 
 #: A relative descent beyond positive sides of fillings counts from here: those of two places differ by the error of a method.
@@ -39,6 +41,8 @@ BEYOND_FILLINGS = 1e-4
 #: A value above this, relative to the objective, matters although the descent relative to the objective's terms does not count.
 #: It is also above this part of the objective's largest term: what a solution with all digits would not leave.
 MATTERS, LEFT = 1e-3, 1e-10
+#: Variables that do not move are 0 below this.
+AT_ZERO = 1e-9
 #: Displacements, relative to the variables' sizes, along which gradients are compared; so many, in random directions.
 DISPLACEMENT, DISPLACEMENTS, SEED = 1e-4, 2, 0
 
@@ -145,7 +149,7 @@ class Lpec:
             if descent.proved(y) <= enough and not self._matters(w, descent, descent.least(y)):
                 return LpecResult(True, 0.0, np.zeros(len(w)), sets.zero, 0)
         matters = partial(self._matters, w, descent)
-        found = self.best(sets, at, descent, limits) if limits else self.searched(sets, at, descent, enough, matters)
+        found = self.best(sets, at, descent, limits) if limits else self.searched(sets, at, descent, enough, matters, drifts=True)
         return replace(found, matters=found.descent <= enough and matters(found.value))
 
     def _matters(self, w, descent, value):
@@ -160,35 +164,46 @@ class Lpec:
         sets = without_constant(sets, self._sides, (lower == 0.0) & (upper == 0.0))
         return sets, equal, self._linearised(w, sets, equal, reach, lower, upper, released)
 
-    def searched(self, sets, at, descent, enough, matters=lambda value: False) -> LpecResult:
+    def searched(self, sets, at, descent, enough, matters=lambda value: False, drifts=False) -> LpecResult:
         """A direction of a linearised LPEC that descends by more than ``enough``, or the proof that there is none.
 
-        Without one the result is that of the branch whose value ``matters`` most, if there is one.
+        Without one the result is that of the branch whose value ``matters`` most, if there is one.  With ``drifts`` the LPEC is one
+        of this MPCC alone, whose bi-active pairs may decide what the drifts of its contacts are.
         """
-        p, pairs = at.program, int(sets.gamma.sum())
-        none = LpecResult(True, 0.0, np.zeros(len(p.cost)), sets.zero, pairs)
+        pairs = int(sets.gamma.sum())
+        p = PairProgram(at.program, pairs, *(self._undecided_drifts(sets) if drifts else ()))
+        measure = descent.with_rows(p.program, p.own)
+        none = LpecResult(True, 0.0, np.zeros(len(at.program.cost)), sets.zero, pairs)
 
         def branch(sides, answer):
-            zero = sets.zero.copy()
-            zero[sets.gamma] = sides
-            found = self._within_branch(at, zero, sides, descent, answer)
+            found = _within_branch(measure.of(p.with_sides(sides)), answer, _with(sets, sides), pairs)
             return replace(found, descent=0.0) if descent.negligible(found.value) else found
 
-        search = PairSearch(p, pairs, descent, enough, matters, branch, self._options, self._deadline)
+        search = PairSearch(p, measure, enough, matters, branch, self._options, self._deadline)
         found = search.run()
         if found is None and search.is_open:
             return replace(none, solved=False)
         return found or min((other for other in search.others if matters(other.value)), key=attrgetter('value'), default=none)
+
+    def _undecided_drifts(self, sets):
+        """Drifts that the bi-active pairs decide, and the variables that zero sides of these make zero."""
+
+        def zeros(sides):
+            lower, upper = self._sides.bounds(_with(sets, sides), self._c.lbx, self._c.ubx)
+            return (lower == 0.0) & (upper == 0.0)
+
+        return (undecided(self._c.drifts, zeros, int(sets.gamma.sum())) if self._c.drifts else []), zeros
 
     def best(self, sets, at, descent, limits=None) -> LpecResult:
         """The best direction of a linearised LPEC and its relative descent, as HiGHS finds it with a binary for each pair."""
         found = self._mixed_integer(sets, at, limits)
         if not found.solved or descent.negligible(found.value):
             return found
-        answer = solve(with_sides(at.program, found.zero[sets.gamma]), self._options, self._deadline, limits=limits)
+        branch = PairProgram(at.program, found.binaries).with_sides(found.zero[sets.gamma])
+        answer = solve(branch, self._options, self._deadline, limits=limits)
         if answer is None or answer.y is None:
             return replace(found, descent=-found.value / float(np.abs(at.program.cost) @ at.program.reach))
-        return self._within_branch(at, found.zero, found.zero[sets.gamma], descent, answer)
+        return _within_branch(descent.of(branch), answer, found.zero, found.binaries)
 
     def _linearised(self, w, sets, equal, reach, lower, upper, released):
         c = self._c
@@ -201,6 +216,9 @@ class Lpec:
         high = [np.maximum(c.ubg - at.g, 0.0), 0.0, np.inf, 0.0, np.inf, 0.0, np.inf, np.inf, np.inf, np.inf]
         places = row_places(sets, equal, len(c.lbg))
         low, high = (np.concatenate([np.broadcast_to(v, len(rows)) for v, rows in zip(by, places)]) for by in (low, high))
+        settle_drifts(c, (lower == 0.0) & (upper == 0.0) & (np.abs(w) <= AT_ZERO), lower, upper, low, high)
+        weighted = [drift.row for drift in self._undecided_drifts(sets)[0]]
+        low[weighted], high[weighted] = -np.inf, np.inf
         program = Program(c.gradients(w)[0], c.stacked_jacobian(w)[np.concatenate(places)], low, high, lower, upper, reach)
         return Linearised(program, equal, G[gamma], H[gamma])
 
@@ -272,12 +290,17 @@ class Lpec:
         zero[sets.gamma] = np.where(answer.d[n:] > 0.5, H_ZERO, G_ZERO)
         return LpecResult(True, min(float(p.cost @ answer.d[:n]), 0.0), answer.d[:n], zero, y)
 
-    @staticmethod
-    def _within_branch(at, zero, sides, descent, answer):
-        """The result of the best direction of branch ``zero``, whose multipliers show the relative descent."""
-        p = at.program
-        measured = descent.of(with_sides(p, sides)).proved(answer.y)
-        return LpecResult(True, min(float(p.cost @ answer.d), 0.0), answer.d, zero, len(sides), measured)
+
+def _with(sets, sides):
+    """The zero sides of all pairs with those of the bi-active ones."""
+    zero = sets.zero.copy()
+    zero[sets.gamma] = sides
+    return zero
+
+
+def _within_branch(descent, answer, zero, pairs):
+    """The result of the best direction of branch ``zero``, whose multipliers show the relative descent."""
+    return LpecResult(True, min(descent.value(answer.d), 0.0), answer.d, zero, pairs, descent.proved(answer.y))
 
 
 def _product(A, rows, y):

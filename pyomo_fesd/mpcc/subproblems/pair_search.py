@@ -5,7 +5,7 @@ show that nothing in it descends settle it, whoever gave them (``Descent``), and
 use: the search jumps over these.  So HiGHS is never believed.  A node that it cannot solve is divided; one in which nothing is left
 to divide stays open, where HiGHS' own branch and bound calls it infeasible.
 
-Takes: a program whose last rows are the sides G, then H, of the bi-active pairs, each from minus its value at the point.
+Takes: the ``PairProgram`` of an LPEC.
 Leaves: a branch that descends; or that there is none; or neither.
 """
 
@@ -32,11 +32,9 @@ class PairSearch:
 
     Parameters
     ----------
-    program : Program
-    pairs : int
-        number of bi-active pairs
+    program : PairProgram
     descent : Descent
-        of the program
+        of its program
     enough : float
         a relative descent of at most this does not count
     matters : callable (value) -> bool
@@ -55,15 +53,14 @@ class PairSearch:
         whether a node was left open
     """
 
-    def __init__(self, program, pairs, descent, enough, matters, branch, options, deadline):
-        self._p, self._pairs, self._branch = program, pairs, branch
+    def __init__(self, program, descent, enough, matters, branch, options, deadline):
+        self._p, self._pairs, self._branch = program, program.pairs, branch
         self._descent, self._enough, self._matters = descent, enough, matters
-        self._repeated, self._deadline = RepeatedProgram(program, options, deadline), deadline
-        self._proofs, self._unknown, self._failures, self._next_trial = [], set(), 0, 0
+        self._repeated, self._deadline = RepeatedProgram(program.program, options, deadline), deadline
+        self._proofs, self._is_known, self._failures, self._next_trial = [], {}, 0, 0
         self.others, self.is_open = [], False
-        self._last = slice(len(program.low) - 2 * pairs, None)
-        sides = program.A[self._last]
-        self._size = np.maximum(abs(sides) @ program.reach, SMALLEST)
+        self._sides, self._low = program.program.A[program.last], program.program.low[program.last]
+        self._size = np.maximum(abs(self._sides) @ program.program.reach, SMALLEST)
 
     def run(self):
         """The first branch found that descends, or None."""
@@ -79,7 +76,7 @@ class PairSearch:
                 found = self._look_at(np.where(is_free, likely, sides))
                 if found is not None:
                     return found
-            self.is_open |= sides.tobytes() in self._unknown
+            self.is_open |= not self._is_known.get(sides.tobytes(), True)
             if is_free.any():
                 waiting += _divided(sides, self._next_pair(is_free, low), likely)
             is_first = False
@@ -87,12 +84,13 @@ class PairSearch:
         return None
 
     def _look_at(self, sides):
-        """The best direction with these sides if it descends; else None, and the branch is settled if it is known."""
-        if self._with_forced(sides) is None:
+        """The best direction with these sides if it descends, else None; looked at once, unless it is settled."""
+        key = sides.tobytes()
+        if key in self._is_known or self._with_forced(sides) is None:
             return None
-        answer = self._repeated.optimum(upper_bounds(self._p, sides))
+        answer = self._repeated.optimum(self._p.upper_bounds(sides))
+        self._is_known[key] = answer is not None
         if answer is None:
-            self._unknown.add(sides.tobytes())
             return None
         result = self._branch(sides, answer)
         if result.descent > self._enough:
@@ -128,10 +126,10 @@ class PairSearch:
 
     def _solve(self, sides):
         """The direction of a node, None if it is settled."""
-        answer = self._repeated.solve(upper_bounds(self._p, sides))
+        answer = self._repeated.solve(self._p.upper_bounds(sides))
         if answer is None:
             self._failures += 1
-            return np.zeros(len(self._p.cost))
+            return np.zeros(len(self._p.program.cost))
         return None if self._settle(sides, answer.y) else answer.d
 
     def _settle(self, sides, y):
@@ -143,7 +141,7 @@ class PairSearch:
 
     def _settles(self, sides, y):
         """Whether multipliers show that nothing in a node counts."""
-        node = self._descent.of(with_sides(self._p, sides))
+        node = self._descent.of(self._p.with_sides(sides))
         least = node.least(y)
         return (node.proved(y) <= self._enough or self._descent.negligible(least)) and not self._matters(least)
 
@@ -161,7 +159,7 @@ class PairSearch:
             other = needed.copy()
             other[i] = 1 - needed[i]
             self._repeated.restart(basis)
-            answer = self._repeated.solve(upper_bounds(self._p, other))
+            answer = self._repeated.solve(self._p.upper_bounds(other))
             if answer is not None and self._settles(other, answer.y):
                 self._proofs.append(self._needed(other, answer.y))
                 if self._settle_together(needed, y, steps | {i: answer.y - y}):
@@ -174,7 +172,9 @@ class PairSearch:
     def _settle_together(self, needed, y, steps):
         """Whether multipliers ``y`` plus any of the ``steps``, by pair, settle the nodes with the other side of these pairs."""
         first, last = len(y) - 2 * self._pairs, len(y) - self._pairs
-        high, clipped = upper_bounds(self._p, needed), np.zeros(len(y))
+        either = needed.copy()
+        either[list(steps)] = FREE
+        high, clipped = self._p.upper_bounds(either), np.zeros(len(y))
         for i in steps:
             sides = first + i, last + i
             high[list(sides)] = 0.0
@@ -182,12 +182,12 @@ class PairSearch:
             for row, own in ((here, steps[i][here]), (there, 0.0)):
                 least = y[row] + own + sum(min(step[row], 0.0) for j, step in steps.items() if j != i)
                 clipped[row] = max(-least, 0.0)
-        descent, least = self._descent.of(replace(self._p, high=high)).proved_of_sums(y, list(steps.values()), clipped)
+        descent, least = self._descent.of(replace(self._p.program, high=high)).proved_of_sums(y, list(steps.values()), clipped)
         return descent <= self._enough and not self._matters(least)
 
     def _needed(self, sides, y):
         """The sides without which multipliers would not settle a node."""
-        of_G, of_H = np.minimum(y[self._last] * self._size, 0.0).reshape(2, -1)
+        of_G, of_H = np.minimum(y[self._p.last] * self._size, 0.0).reshape(2, -1)
         part = np.where(sides == G_ZERO, of_G, of_H)
         needed = np.where(part < 0, sides, FREE)
         for i in sorted(np.flatnonzero(needed != FREE), key=lambda i: -part[i]):
@@ -199,20 +199,8 @@ class PairSearch:
 
     def _smaller_sides(self, d):
         """The smaller side of each pair after a step, relative to what its row can reach, and which one it is."""
-        G, H = ((self._p.A[self._last] @ d - self._p.low[self._last]) / self._size).reshape(2, -1)
+        G, H = ((self._sides @ d - self._low) / self._size).reshape(2, -1)
         return np.minimum(G, H), np.where(G <= H, G_ZERO, H_ZERO)
-
-
-def upper_bounds(program, sides):
-    """Upper bounds of the rows with these zero sides of the last pairs."""
-    high = program.high.copy()
-    high[len(high) - 2 * len(sides) :] = np.where(np.concatenate([sides == G_ZERO, sides == H_ZERO]), 0.0, np.inf)
-    return high
-
-
-def with_sides(program, sides):
-    """The program with these zero sides of the last pairs."""
-    return replace(program, high=upper_bounds(program, sides))
 
 
 def _divided(sides, i, likely):

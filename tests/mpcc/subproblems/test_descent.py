@@ -50,3 +50,18 @@ def test_a_descent_is_negligible_beside_the_largest_term_or_its_changes():
     assert not Descent(program, list).negligible(-1.1e-8 * largest)
     assert changing.negligible(-0.9e-5 * largest)
     assert not changing.negligible(-1.1e-5 * largest)
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_what_is_proved_of_sums_holds_for_each_of_them(seed):
+    program, _, y = drawn(seed)
+    random = np.random.default_rng(seed)
+    turned = random.normal(size=(len(program.cost), len(y)))
+    descent = Descent(program, lambda: [(0.1 * program.cost, lambda y: turned @ y)])
+    steps = [0.3 * random.normal(size=len(y)) * (random.random(len(y)) < 0.5) for _ in range(3)]
+    proved, least = descent.proved_of_sums(y, steps, np.zeros(len(y)))
+    for chosen in range(8):
+        of_sum = y + sum(step for k, step in enumerate(steps) if chosen >> k & 1)
+        assert descent.proved(of_sum) <= proved + 1e-12
+        assert descent.least(of_sum) >= least - 1e-12
+    assert descent.proved_of_sums(y, [], np.zeros(len(y))) == pytest.approx((descent.proved(y), descent.least(y)))

@@ -1,0 +1,47 @@
+"""A program that is solved again from the last basis, against the same one solved at once."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from pyomo_fesd.mpcc.nlp import Deadline
+from pyomo_fesd.mpcc.subproblems import repeated_program
+from pyomo_fesd.mpcc.subproblems.descent import Descent
+from pyomo_fesd.mpcc.subproblems.linear_program import Program, solve
+from pyomo_fesd.mpcc.subproblems.repeated_program import RepeatedProgram
+
+
+def drawn(seed, m=12, n=9):
+    random = np.random.default_rng(seed)
+    A, scale = random.normal(size=(m, n)), 10.0 ** random.uniform(-3, 3, n)
+    return Program(random.normal(size=n) / scale, sparse.csr_matrix(A / scale), -np.ones(m), np.ones(m), -scale, scale, scale)
+
+
+@pytest.mark.parametrize('seed', range(10))
+def test_each_answer_is_that_of_a_program_of_its_own(seed):
+    program, random = drawn(seed), np.random.default_rng(seed)
+    repeated = RepeatedProgram(program, {}, Deadline())
+    for _ in range(8):
+        high = random.choice([0.0, 0.3, 1.0, np.inf], len(program.high))
+        bounded = replace(program, high=high)
+        value = program.cost @ solve(bounded, {}, Deadline()).d
+        for answer in (repeated.solve(high), repeated.optimum(high)):
+            assert program.cost @ answer.d == pytest.approx(value, abs=1e-7)
+            assert Descent(bounded, list).least(answer.y) == pytest.approx(value, abs=1e-6)
+
+
+def test_where_the_simplex_method_does_not_end_others_give_multipliers_that_prove_nearly_the_value(monkeypatch):
+    monkeypatch.setattr(repeated_program, 'FIRST', 0.0)
+    program = drawn(0)
+    value = program.cost @ solve(program, {}, Deadline()).d
+    repeated = RepeatedProgram(program, {}, Deadline())
+    assert repeated.basis is None
+    assert Descent(program, list).least(repeated.solve(program.high).y) == pytest.approx(value, abs=1e-3)
+    assert program.cost @ repeated.optimum(program.high).d == pytest.approx(value, abs=1e-7)
+
+
+def test_nothing_is_solved_after_the_deadline():
+    repeated = RepeatedProgram(drawn(1), {}, Deadline.after(0.0))
+    assert repeated.optimum(drawn(1).high) is None
