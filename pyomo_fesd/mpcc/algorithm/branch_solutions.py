@@ -69,6 +69,20 @@ class BranchSolutions:
             self._known[key] = found = self._solution(w, zero, duals, below, **more)
         return self._point(found, below, enough)
 
+    def onward(self, point, zero, enough):
+        """The certified solution of a branch from ``point``, with the same decisions; None without one of at most ``enough``.
+
+        A direction of the LPEC at the point is one with these decisions.
+        """
+        solved = self._subsolves.branch(point.w, zero, point.equal, 0.0)
+        if solved is None or self._asks_for_more(solved.w, point.equal):
+            return None
+        return self._point(self._measured(_Solution(nlp=solved, equal=point.equal)), np.inf, enough)
+
+    def _asks_for_more(self, w, equal):
+        """Whether a solution asks for decisions that were not imposed."""
+        return bool(np.any((self._c.evaluate(w).eta > self._tolerances.eta) & ~equal))
+
     def _point(self, found, below, enough):
         if found.nlp is None or _is_clearly_above(found.f, below) or found.f > enough:
             return None
@@ -82,8 +96,10 @@ class BranchSolutions:
             # feasible, so the branch has a solution, but not at its minimum yet
             again = self._solve(found.nlp.w, zero, found.nlp, below, **more | {'max_iter': MORE[more['max_iter']]})
             found = found if again.nlp is None else again
-        if found.nlp is None:
-            return found
+        return found if found.nlp is None else self._measured(found)
+
+    def _measured(self, found):
+        """The solution with its objective, and what that owes to violated rows; none where it shows no minimum."""
         found.f = self._c.evaluate(found.nlp.w).f
         if np.abs(found.nlp.w).max(initial=0.0) > UNBOUNDED:
             if found.f < self._c.evaluate(self._c.x0).f:
@@ -132,7 +148,7 @@ class BranchSolutions:
             return None, None
         equal = self._c.evaluate(at_sides).eta > self._tolerances.eta
         solved = self._subsolves.branch(w, zero, equal, 0.0, **more)
-        if solved is None or np.any((self._c.evaluate(solved.w).eta > self._tolerances.eta) & ~equal):
+        if solved is None or self._asks_for_more(solved.w, equal):
             return None, None
         return solved, equal
 

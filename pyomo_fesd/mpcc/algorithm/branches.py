@@ -53,7 +53,7 @@ class Branches:
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
         self._attempts, self._solved, self._exhausted = Counter(), {}, {}
-        self._first = SECOND if patient else FIRST
+        self._patient, self._first = patient, SECOND if patient else FIRST
         self.solutions, self.neighbours = BranchSolutions(subsolves, at_once=patient), Neighbours(subsolves)
 
     # called by the algorithm
@@ -272,6 +272,9 @@ class Branches:
     def _step_down(self, point, enough):
         """In the branch of the certificate's direction: from its end, or within ever smaller trust regions."""
         step, w = point.certificate.lpec, point.w
+        better = self.solutions.onward(point, step.zero, enough) if self._patient and point.equal is not None else None
+        if better is not None:
+            return better
         better = self._point(w + step.d, step.zero, None, False)
         radius = self._tolerances.radius
         sets = self._subsolves.sets(w, self._tolerances.biactive)
