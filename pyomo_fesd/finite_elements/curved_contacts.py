@@ -6,15 +6,29 @@ the state jumps, and mu in the collocation equations of the positions.
 Does not apply: where the gap is linear, as the normal velocity is 0 by itself.
 """
 
+import numpy as np
 from pyomo.common.collections import ComponentSet
-from pyomo.core import Block, Constraint, Set, Var, quicksum
+from pyomo.core import Block, Constraint, Set, Var, quicksum, value
+from pyomo.core.expr.calculus.derivatives import differentiate
 from pyomo.core.expr.visitor import identify_variables
 
-from pyomo_fesd.core import DriftSides, MovingGrid, TimeIndex, homotopy_hints, is_discretisation_equation, without_unit
+from pyomo_fesd.core import (
+    DriftSides,
+    MovingGrid,
+    TimeIndex,
+    homotopy_hints,
+    is_discretisation_equation,
+    kept_values,
+    without_unit,
+)
 from pyomo_fesd.finite_elements.impulse_balance import BoundaryEquations
 
 #: Keeps the drift 0 where gap and force are both 0.
 NOWHERE = 1e-25
+#: A drift turns the normal of the surface by less than this part of what would bring it to another point with the same tangent.
+PART = 0.5
+#: Newton's steps to the surface, and what is left of the gap there, relative to the gradient.
+STEPS, LEFT = 20, 1e-6
 
 
 def stabilise(moving: MovingGrid) -> None:
@@ -34,8 +48,10 @@ def stabilise(moving: MovingGrid) -> None:
     equations = BoundaryEquations(block.model(), times, {t for e in moving.grid.elements for t in e.points})
     shifts = {}
     for law in curved:
+        curvature = _curvature(law, equations, times)
         for element in moving.grid.elements:
-            _stabilise_element(moving, block, law, element, equations, shifts)
+            most = PART / (curvature * element.length) if curvature else None
+            _stabilise_element(moving, block, law, element, equations, shifts, most)
     _shift_positions(block.model(), shifts)
 
 
@@ -44,19 +60,48 @@ def _is_curved(law):
     return any(gap.polynomial_degree() not in (0, 1) for gap in law.gaps.values())
 
 
-def _stabilise_element(moving, block, law, element, equations, shifts):
+def _stabilise_element(moving, block, law, element, equations, shifts, most):
     distances, forces = law.distances_in(element), law.forces_in(element)
     gap, force = quicksum(distances), quicksum(forces)
     for r, t in enumerate(element.points, start=1):
         index = law.name, element.n, r
         drift, rate = block.drift[index], block.rate[index]
+        drift.bounds = None if most is None else -most, most
         gamma = equations.normal_velocity(law.gaps[t], law.forces[t][0].parent_block(), ComponentSet())
         # the opposite sign of gamma would allow a drift that keeps the gap closed while the bodies approach, where both are small
         block.rates.add(index, without_unit(gamma) == rate)
         row = block.closed.add(index, ((gap + NOWHERE) * drift - force * gamma) / (gap + force + NOWHERE) == 0)
         homotopy_hints(block).drifts.append(DriftSides(drift, rate, row, distances, forces))
         for xdot, slope in equations.gradient(law.gaps[t]):
-            shifts[id(xdot)] = shifts.get(id(xdot), 0) + slope * drift * moving.r[element.n]
+            shifts[id(xdot)] = shifts.get(id(xdot), 0) + slope * drift
+
+
+def _curvature(law, equations, times):
+    """The norm of the gap's second derivatives where the surface is nearest to the first positions; None where it is not found."""
+    gap = next(gap for t, gap in law.gaps.items() if t != times.wrt.first())
+    positions, slopes = equations.positions(gap), [slope for _, slope in equations.gradient(gap)]
+    starts = [times.at(v, times.wrt.first()) for v in positions]
+    with kept_values(positions):
+        for v, start in zip(positions, starts):
+            v.set_value(start.value, skip_validation=True)
+        try:
+            return _curvature_at_surface(gap, positions, slopes)
+        except (ArithmeticError, ValueError, TypeError):
+            return None
+
+
+def _curvature_at_surface(gap, positions, slopes):
+    for _ in range(STEPS):
+        gradient = np.array([value(slope) for slope in slopes])
+        size = float(gradient @ gradient)
+        if not size > 0.0:
+            return None
+        step = -value(gap) / size * gradient
+        for v, change in zip(positions, step):
+            v.set_value(v.value + change, skip_validation=True)
+    hessian = [differentiate(slope + 0 * positions[0], wrt_list=positions) for slope in slopes]
+    norm = float(np.linalg.norm(np.array(hessian, dtype=float), 2))
+    return norm if np.isfinite(norm) and norm > 0.0 and abs(value(gap)) <= LEFT * size**0.5 else None
 
 
 def _shift_positions(model, shifts):

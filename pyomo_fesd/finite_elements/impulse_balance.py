@@ -192,8 +192,11 @@ class BoundaryEquations:
 
     def gradient(self, gap) -> list[tuple]:
         """Return the derivatives of the positions in a ``gap``, each with the slope of the gap in its position."""
-        positions = [x for x in ComponentSet(identify_variables(gap)) if x in self._derivatives]
-        return [(self._derivatives[x], _slope(x, gap, x)) for x in positions]
+        return [(self._derivatives[x], _slope(x, gap, x)) for x in self.positions(gap)]
+
+    def positions(self, gap) -> list:
+        """Return the differential states in a ``gap``."""
+        return [x for x in ComponentSet(identify_variables(gap)) if x in self._derivatives]
 
     def _rate(self, xdot, x):
         """The derivative of a position as a function of states."""
