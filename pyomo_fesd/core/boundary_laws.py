@@ -86,6 +86,11 @@ class Impacts:
         return self.block.component('rates')
 
     @property
+    def turned(self) -> Constraint | None:
+        """How far mu may turn the normal of the surface."""
+        return self.block.component('turned')
+
+    @property
     def closed(self) -> Constraint | None:
         """The equations of mu."""
         return self.block.component('closed')

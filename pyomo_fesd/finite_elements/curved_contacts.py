@@ -44,14 +44,15 @@ def stabilise(moving: MovingGrid) -> None:
     block.point = Set(initialize=range(1, len(moving.grid.tau) + 1))
     block.drift = Var(block.contact, moving.block.element, block.point, initialize=0, dense=False)
     block.rate = Var(block.contact, moving.block.element, block.point, initialize=0, dense=False)
-    block.rates, block.closed = (Constraint(block.contact, moving.block.element, block.point) for _ in range(2))
+    by_point = block.contact, moving.block.element, block.point
+    block.rates, block.closed, block.turned = (Constraint(*by_point) for _ in range(3))
     equations = BoundaryEquations(block.model(), times, {t for e in moving.grid.elements for t in e.points})
     shifts = {}
     for law in curved:
         curvature = _curvature(law, equations, times)
         for element in moving.grid.elements:
-            most = PART / (curvature * element.length) if curvature else None
-            _stabilise_element(moving, block, law, element, equations, shifts, most)
+            _stabilise_element(moving, block, law, element, equations, shifts)
+            _limit_turns(block, law.name, element, curvature)
     _shift_positions(block.model(), shifts)
 
 
@@ -60,13 +61,12 @@ def _is_curved(law):
     return any(gap.polynomial_degree() not in (0, 1) for gap in law.gaps.values())
 
 
-def _stabilise_element(moving, block, law, element, equations, shifts, most):
+def _stabilise_element(moving, block, law, element, equations, shifts):
     distances, forces = law.distances_in(element), law.forces_in(element)
     gap, force = quicksum(distances), quicksum(forces)
     for r, t in enumerate(element.points, start=1):
         index = law.name, element.n, r
         drift, rate = block.drift[index], block.rate[index]
-        drift.bounds = None if most is None else -most, most
         gamma = equations.normal_velocity(law.gaps[t], law.forces[t][0].parent_block(), ComponentSet())
         # the opposite sign of gamma would allow a drift that keeps the gap closed while the bodies approach, where both are small
         block.rates.add(index, without_unit(gamma) == rate)
@@ -74,6 +74,12 @@ def _stabilise_element(moving, block, law, element, equations, shifts, most):
         homotopy_hints(block).drifts.append(DriftSides(drift, rate, row, distances, forces))
         for xdot, slope in equations.gradient(law.gaps[t]):
             shifts[id(xdot)] = shifts.get(id(xdot), 0) + slope * drift
+
+
+def _limit_turns(block, name, element, curvature):
+    """Let drifts not turn the normal so far that the body is at another point of the surface with the same tangent."""
+    for r in block.point if curvature else ():
+        block.turned.add((name, element.n, r), (-PART, curvature * element.length * block.drift[name, element.n, r], PART))
 
 
 def _curvature(law, equations, times):

@@ -1,12 +1,13 @@
 """Solve one element after the other, each up to the next switch, the end of a mode with hysteresis, or a state jump."""
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import chain
 from math import log2
 
 from pyomo.common.collections import ComponentMap
-from pyomo.core import Block, Var
+from pyomo.core import Block, Var, value
 from pyomo.core.base.var import VarData
 
 from pyomo_fesd.core import Element, TimeIndex, derivatives, moving_grids, own_data, phase
@@ -40,6 +41,8 @@ ENDS, FOLLOWED = 1e-3, (2.0, 10.0)
 #: A step of length zero is a local solution of its own where a switch lies on the left boundary.  Then lengths of at least these
 #: parts of the aim are asked for; a step is longer by the last part, else the bound holds it.
 LEAST, BEYOND, LONGER = (1e-2, 1e-4), {'lpec': 'full', 'relaxation': 'elastic'}, 1e-3
+#: Round-off in how far a drift turns a surface.
+TURNED = 1e-6
 
 
 class ElementSolver:
@@ -60,6 +63,9 @@ class ElementSolver:
         self._grid, self._hysteresis = self._moving.grid, read_hysteresis(self._moving)
         self._jumps = JumpEvents(self._moving.state_jumps)
         has_contacts = self._moving.state_jumps is not None and self._moving.state_jumps.impacts is not None
+        self._turned = defaultdict(list)
+        for (_, n, _), c in ((self._moving.state_jumps.impacts.turned if has_contacts else None) or {}).items():
+            self._turned[n].append(c)
         # gaps and forces of contacts are 0 to round-off over long times, which is no size
         self._sizes = Sizes(self._times) if has_contacts else None
         self._impacts = ImpactEvents(self._moving.state_jumps, self._times, self._solve_impact)
@@ -136,9 +142,19 @@ class ElementSolver:
         while (position := min(self._arrivals(element), default=last)) < last:
             # a function is zero at a collocation point already: the element ends there
             h, end = self._step(element, h * self._grid.tau[position - 1], True)
+        self._check_turns(element)
         self._end = end
         events = [] if element is self._grid.elements[-1] else self._pass_boundary(element)
         return SimulatedElement(h, end.activity, events)
+
+    def _check_turns(self, element):
+        """Refuse a solution in which a drift has brought a body to another side of a surface (eq. 22)."""
+        for c in self._turned[element.n]:
+            if not c.lower * (1 + TURNED) <= value(c.body) <= c.upper * (1 + TURNED):
+                raise self._progress.error(
+                    f"from time {self._progress.time:.6g} on the contact '{c.index()[0]}' is found on another side of its surface",
+                    "take more elements, or let the positions begin with values near the first ones (initialize=)",
+                )
 
     def _arrivals(self, element):
         return [position for source in self._sources() for position in source.find_arrivals(element)]

@@ -169,6 +169,50 @@ def test_a_curved_contact_keeps_the_order(ncp):
     assert np.log2(errors[0] / errors[1]) > (0.6 if ncp == 1 else 2 * ncp - 1.3)
 
 
+@pytest.mark.parametrize('nfe', [1, 2, 3, 5])
+@pytest.mark.parametrize('ncp', [1, 2, 3])
+def test_a_mass_at_rest_on_a_disc_is_no_minimum_where_a_force_can_take_it_away(nfe, ncp):
+    # gap and contact force are both 0: the weighted equation of the drift has no derivative there
+    m = move(contacts.resting(), nfe, ncp)
+    pyomo_fesd.simulate(m, inputs=m.u)
+    assert (m.q[1, 1].value, m.q[2, 1].value) == pytest.approx((0.6, 0.8))
+    found = pyomo_fesd.certify(m)
+    assert found.grade.name == 'DESCENT' and found.value < -0.01
+    m.away.sense = pyo.maximize
+    assert pyomo_fesd.certify(m).grade.name == 'B'
+
+
+@pytest.mark.parametrize('nfe', [2, 5])
+def test_a_force_takes_it_away_as_far_as_it_can(nfe):
+    m = move(contacts.resting(), nfe, 2)
+    assert pyo.SolverFactory('mpec_hybrid').solve(m).solver.stationarity == 'B'
+    assert pyo.value(m.away) == pytest.approx(-1 - (0.6 + 0.8) / 2, abs=1e-6)
+
+
+@pytest.mark.parametrize('guess', [-1.0, -0.5, 1e-3, 3.0])
+def test_no_drift_brings_a_body_to_the_other_side(guess):
+    m = move(contacts.resting(guess), 3, 2)
+    try:
+        pyomo_fesd.simulate(m, inputs=m.u)
+    except FesdError as error:
+        assert 'another side of its surface' in str(error) and 'initialize' in str(error)
+    else:
+        assert (m.q[1, 1].value, m.q[2, 1].value) == pytest.approx((0.6, 0.8))
+
+
+@pytest.mark.parametrize('build, curvature', [(contacts.bowl, 1), (contacts.resting, 2), (lambda: contacts.discs(0), 2)])
+def test_a_drift_turns_the_normal_by_half_of_what_the_other_side_takes(build, curvature):
+    # of a distance |x_1 - x_2| the second derivatives in both positions are those in one, twice
+    m = move(build(), 4, 2)
+    turned = moving_grids(m)[m.t].state_jumps.impacts.turned
+    assert len(turned) == 8
+    for (name, n, r), c in turned.items():
+        drift = moving_grids(m)[m.t].state_jumps.impacts.drift[name, n, r]
+        drift.set_value(1.0)
+        length = moving_grids(m)[m.t].grid.elements[n - 1].length
+        assert pyo.value(c.body) == pytest.approx(curvature * length, rel=1e-6) and (c.lower, c.upper) == (-0.5, 0.5)
+
+
 # Friction
 
 

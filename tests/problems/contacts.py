@@ -140,6 +140,24 @@ def bowl(end=0.6, angle=1.0):
     return m
 
 
+def resting(guess=1.0):
+    """A mass without weight that rests on a disc of radius 1, with a force as control; ``guess`` times its place is the start."""
+    places = {1: 0.6, 2: 0.8}
+    m = pyo.ConcreteModel()
+    m.t, m.i = dae.ContinuousSet(bounds=(0, 1)), pyo.RangeSet(2)
+    m.q = pyo.Var(m.i, m.t, initialize=lambda m, i, t: guess * places[i])
+    m.v, m.u = pyo.Var(m.i, m.t, initialize=0), pyo.Var(m.i, m.t, bounds=(-1, 1), initialize=0)
+    m.dq, m.dv = dae.DerivativeVar(m.q, wrt=m.t), dae.DerivativeVar(m.v, wrt=m.t)
+    for i in m.i:
+        m.q[i, 0].fix(places[i])
+        m.v[i, 0].fix(0)
+    m.touch = pyomo_fesd.contact(m.t, gap=lambda m, t: m.q[1, t] ** 2 + m.q[2, t] ** 2 - 1)
+    m.way = pyo.Constraint(m.i, m.t, rule=lambda m, i, t: m.dq[i, t] == m.v[i, t])
+    m.balance = pyo.Constraint(m.i, m.t, rule=lambda m, i, t: m.dv[i, t] == m.u[i, t] + 2 * m.q[i, t] * m.touch[t].normal)
+    m.away = pyo.Objective(expr=-(0.6 * m.q[1, 1] + 0.8 * m.q[2, 1]))
+    return m
+
+
 def in_bowl(end=0.6, angle=1.0):
     """x, y, v, w of the bead at ``end``: a pendulum."""
     found = solve_ivp(lambda t, z: [z[1], -G * np.sin(z[0])], (0, end), [angle, 0], rtol=1e-12, atol=1e-13)
