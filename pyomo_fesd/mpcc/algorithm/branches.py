@@ -270,11 +270,8 @@ class Branches:
         return next((better for better in found if is_below(better, enough)), None)
 
     def _step_down(self, point, enough):
-        """In the branch of the certificate's direction: from its end, or within ever smaller trust regions."""
+        """In the branch of the direction of the certificate: from its end, within ever smaller trust regions, or onward from the point."""
         step, w = point.certificate.lpec, point.w
-        better = self.solutions.onward(point, step.zero, enough) if self._patient and point.equal is not None else None
-        if better is not None:
-            return better
         better = self._point(w + step.d, step.zero, None, False)
         radius = self._tolerances.radius
         sets = self._subsolves.sets(w, self._tolerances.biactive)
@@ -284,11 +281,15 @@ class Branches:
             radius *= SHRINK
             step = self._subsolves.lpec(w, sets, radius, point.equal)
             if not step.solved or step.descent == 0.0:
-                return None
+                break
             reach = radius * np.maximum(1.0, np.abs(w))
             within = {'box': (w - reach, w + reach), 'max_iter': self._first}
             better = self.solutions.certified(w + step.d, step.zero, below=point.f, **within)
-        return better if is_below(better, enough) or _settles(better, point) else None
+        if is_below(better, enough) or _settles(better, point):
+            return better
+        # from the end of a direction Ipopt may go back; from the point itself it follows it, if slowly
+        follows = self._patient and point.equal is not None
+        return self.solutions.onward(point, point.certificate.lpec.zero, enough) if follows else None
 
     def _beyond(self, point, enough, tolerance, clear, limits=None):
         """A better point in the branch that the LPEC names if all sides below ``tolerance`` count as zero."""
