@@ -270,7 +270,7 @@ class Branches:
         return next((better for better in found if is_below(better, enough)), None)
 
     def _step_down(self, point, enough):
-        """In the branch of the direction of the certificate: from its end, within ever smaller trust regions, or onward from the point."""
+        """In the branch of the direction: from its end, within ever smaller trust regions, or onward from the point."""
         step, w = point.certificate.lpec, point.w
         better = self._point(w + step.d, step.zero, None, False)
         radius = self._tolerances.radius
