@@ -52,7 +52,7 @@ def stabilise(moving: MovingGrid) -> None:
         curvature = _curvature(law, equations, times)
         for element in moving.grid.elements:
             _stabilise_element(moving, block, law, element, equations, shifts)
-            _limit_turns(block, law.name, element, curvature)
+            _limit_turns(block, law.name, element, moving.r[element.n], curvature)
     _shift_positions(block.model(), shifts)
 
 
@@ -73,13 +73,14 @@ def _stabilise_element(moving, block, law, element, equations, shifts):
         row = block.closed.add(index, ((gap + NOWHERE) * drift - force * gamma) / (gap + force + NOWHERE) == 0)
         homotopy_hints(block).drifts.append(DriftSides(drift, rate, row, distances, forces))
         for xdot, slope in equations.gradient(law.gaps[t]):
-            shifts[id(xdot)] = shifts.get(id(xdot), 0) + slope * drift
+            shifts[id(xdot)] = shifts.get(id(xdot), 0) + slope * drift * moving.r[element.n]
 
 
-def _limit_turns(block, name, element, curvature):
+def _limit_turns(block, name, element, r, curvature):
     """Let drifts not turn the normal so far that the body is at another point of the surface with the same tangent."""
-    for r in block.point if curvature else ():
-        block.turned.add((name, element.n, r), (-PART, curvature * element.length * block.drift[name, element.n, r], PART))
+    for k in block.point if curvature else ():
+        way = element.length * r * block.drift[name, element.n, k]
+        block.turned.add((name, element.n, k), (-PART, curvature * way, PART))
 
 
 def _curvature(law, equations, times):
