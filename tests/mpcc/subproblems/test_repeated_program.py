@@ -40,8 +40,3 @@ def test_where_the_simplex_method_does_not_end_others_give_multipliers_that_prov
     assert repeated.basis is None
     assert Descent(program, list).least(repeated.solve(program.high).y) == pytest.approx(value, abs=1e-3)
     assert program.cost @ repeated.optimum(program.high).d == pytest.approx(value, abs=1e-7)
-
-
-def test_nothing_is_solved_after_the_deadline():
-    repeated = RepeatedProgram(drawn(1), {}, Deadline.after(0.0))
-    assert repeated.optimum(drawn(1).high) is None
