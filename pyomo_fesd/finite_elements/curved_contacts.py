@@ -19,6 +19,7 @@ from pyomo_fesd.core import (
     homotopy_hints,
     is_discretisation_equation,
     kept_values,
+    value_or_nan,
     without_unit,
 )
 from pyomo_fesd.finite_elements.impulse_balance import BoundaryEquations
@@ -29,6 +30,8 @@ NOWHERE = 1e-25
 PART = 0.5
 #: Newton's steps to the surface, and what is left of the gap there, relative to the gradient.
 STEPS, LEFT = 20, 1e-6
+#: Another side is looked for so many times as far away as the inverse of the second derivatives, at so many places.
+FARTHEST, SAMPLES = 8.0, 4000
 
 
 def stabilise(moving: MovingGrid) -> None:
@@ -84,7 +87,10 @@ def _limit_turns(block, name, element, r, curvature):
 
 
 def _curvature(law, equations, times):
-    """The norm of the gap's second derivatives where the surface is nearest to the first positions; None where it is not found."""
+    """2/s for the step s along the gradient to the other side of the surface, from where it is nearest to the first positions.
+
+    None without another side.  For a disc it is the norm of the second derivatives.
+    """
     gap = next(gap for t, gap in law.gaps.items() if t != times.wrt.first())
     positions, slopes = equations.positions(gap), [slope for _, slope in equations.gradient(gap)]
     starts = [times.at(v, times.wrt.first()) for v in positions]
@@ -106,9 +112,21 @@ def _curvature_at_surface(gap, positions, slopes):
         step = -value(gap) / size * gradient
         for v, change in zip(positions, step):
             v.set_value(v.value + change, skip_validation=True)
+    if not abs(value(gap)) <= LEFT * size**0.5:
+        return None
     hessian = [differentiate(slope + 0 * positions[0], wrt_list=positions) for slope in slopes]
-    norm = float(np.linalg.norm(np.array(hessian, dtype=float), 2))
-    return norm if np.isfinite(norm) and norm > 0.0 and abs(value(gap)) <= LEFT * size**0.5 else None
+    reach = FARTHEST / float(np.linalg.norm(np.array(hessian, dtype=float), 2))
+    here, steps = [v.value for v in positions], np.linspace(-reach, reach, SAMPLES) if np.isfinite(reach) else ()
+    gaps = [_gap_at(gap, positions, here, s * gradient) for s in steps]
+    # between two steps on one side of the point, beyond the surface itself
+    others = [abs(a + b) / 2 for a, b, g, k in zip(steps, steps[1:], gaps, gaps[1:]) if a * b > 0 > g * k]
+    return 2.0 / min(others) if others else None
+
+
+def _gap_at(gap, positions, here, step):
+    for v, number, change in zip(positions, here, step):
+        v.set_value(number + change, skip_validation=True)
+    return value_or_nan(gap)
 
 
 def _shift_positions(model, shifts):
