@@ -211,7 +211,17 @@ def test_a_drift_turns_the_normal_by_half_of_what_the_other_side_takes(build, cu
         drift.set_value(1.0)
         moving_grids(m)[m.t].r[n].set_value(1.0)
         length = moving_grids(m)[m.t].grid.elements[n - 1].length
-        assert pyo.value(c.body) == pytest.approx(curvature * length, rel=1e-2) and (c.lower, c.upper) == (-0.5, 0.5)
+        assert pyo.value(c.body) == pytest.approx(curvature * length, rel=1e-3) and (c.lower, c.upper) == (-0.5, 0.5)
+
+
+def test_the_ground_has_no_other_side():
+    m = over_time(1.0, q=1.0, v=0.0, a=0.3)
+    m.foot = pyomo_fesd.contact(m.t, gap=lambda m, t: m.q[t] - 0.5 * pyo.cos(m.a[t]))
+    m.kinematics = pyo.Constraint(m.t, rule=lambda m, t: m.dq[t] == m.v[t])
+    m.turn = pyo.Constraint(m.t, rule=lambda m, t: m.da[t] == 0)
+    m.momentum = pyo.Constraint(m.t, rule=lambda m, t: m.dv[t] == -G + m.foot[t].normal)
+    impacts = moving_grids(move(m, 3, 2))[m.t].state_jumps.impacts
+    assert len(impacts.drift) == 6 and len(impacts.turned) == 0
 
 
 # Friction

@@ -126,7 +126,8 @@ class JoinedLpec:
         still = self._fixed_ends(fixed)
         lower[still] = upper[still] = 0.0
         self._pass_on_bounds(lower, upper, reach)
-        return replace(base, program=Program(cost, A, low, high, lower, upper, reach))
+        # drifts that pairs decide stay free, which only adds directions: those of the copies are not known
+        return replace(base, program=Program(cost, A, low, high, lower, upper, reach), drifts=[])
 
     def _pass_on_bounds(self, lower, upper, reach):
         """Make bounds that are conditions on the end of k those of the end of the last copy behind it."""

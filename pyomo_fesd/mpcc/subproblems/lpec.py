@@ -19,16 +19,16 @@ terms.  It is no proof against the point, but worth a look (``LpecResult.matters
 """
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from operator import attrgetter
 
 import numpy as np
-from scipy import sparse
 
 from pyomo_fesd.mpcc.compile import LastPoints, major_index, with_entries
 from pyomo_fesd.mpcc.nlp import Deadline, check_options
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO
+from pyomo_fesd.mpcc.subproblems.binaries import with_binaries
 from pyomo_fesd.mpcc.subproblems.descent import Descent
 from pyomo_fesd.mpcc.subproblems.impact_sides import settle_drifts
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, refusal, solve
@@ -79,13 +79,14 @@ class LpecResult:
 class Linearised:
     """The LPEC at one point, without its binaries: the Program, decisions in force, and values of bi-active sides.
 
-    The Program's last rows are those of G and H of the bi-active pairs.
+    The Program's last rows are those of G and H of the bi-active pairs.  ``drifts`` are those of contacts that these pairs decide.
     """
 
     program: Program
     equal: np.ndarray
     G: np.ndarray
     H: np.ndarray
+    drifts: list = field(default_factory=list)
 
 
 class Lpec:
@@ -149,7 +150,7 @@ class Lpec:
             if descent.proved(y) <= enough and not self._matters(w, descent, descent.least(y)):
                 return LpecResult(True, 0.0, np.zeros(len(w)), sets.zero, 0)
         matters = partial(self._matters, w, descent)
-        found = self.best(sets, at, descent, limits) if limits else self.searched(sets, at, descent, enough, matters, drifts=True)
+        found = self.best(sets, at, descent, limits) if limits else self.searched(sets, at, descent, enough, matters)
         return replace(found, matters=found.descent <= enough and matters(found.value))
 
     def _matters(self, w, descent, value):
@@ -164,14 +165,13 @@ class Lpec:
         sets = without_constant(sets, self._sides, (lower == 0.0) & (upper == 0.0))
         return sets, equal, self._linearised(w, sets, equal, reach, lower, upper, released)
 
-    def searched(self, sets, at, descent, enough, matters=lambda value: False, drifts=False) -> LpecResult:
+    def searched(self, sets, at, descent, enough, matters=lambda value: False) -> LpecResult:
         """A direction of a linearised LPEC that descends by more than ``enough``, or the proof that there is none.
 
-        Without one the result is that of the branch whose value ``matters`` most, if there is one.  With ``drifts`` the LPEC is one
-        of this MPCC alone, whose bi-active pairs may decide what the drifts of its contacts are.
+        Without one the result is that of the branch whose value ``matters`` most, if there is one.
         """
         pairs = int(sets.gamma.sum())
-        p = PairProgram(at.program, pairs, *(self._undecided_drifts(sets) if drifts else ()))
+        p = PairProgram(at.program, pairs, at.drifts, partial(self._zeros, sets))
         measure = descent.with_rows(p.program, p.own)
         none = LpecResult(True, 0.0, np.zeros(len(at.program.cost)), sets.zero, pairs)
 
@@ -185,18 +185,14 @@ class Lpec:
             return replace(none, solved=False)
         return found or min((other for other in search.others if matters(other.value)), key=attrgetter('value'), default=none)
 
-    def _undecided_drifts(self, sets):
-        """Drifts that the bi-active pairs decide, and the variables that zero sides of these make zero."""
-
-        def zeros(sides):
-            lower, upper = self._sides.bounds(_with(sets, sides), self._c.lbx, self._c.ubx)
-            return (lower == 0.0) & (upper == 0.0)
-
-        return (undecided(self._c.drifts, zeros, int(sets.gamma.sum())) if self._c.drifts else []), zeros
+    def _zeros(self, sets, sides):
+        """The variables that zero sides make zero, with these ``sides`` of the bi-active pairs."""
+        lower, upper = self._sides.bounds(_with(sets, sides), self._c.lbx, self._c.ubx)
+        return (lower == 0.0) & (upper == 0.0)
 
     def best(self, sets, at, descent, limits=None) -> LpecResult:
         """The best direction of a linearised LPEC and its relative descent, as HiGHS finds it with a binary for each pair."""
-        found = self._mixed_integer(sets, at, limits)
+        found = self._with_binaries(sets, at, limits)
         if not found.solved or descent.negligible(found.value):
             return found
         branch = PairProgram(at.program, found.binaries).with_sides(found.zero[sets.gamma])
@@ -204,6 +200,16 @@ class Lpec:
         if answer is None or answer.y is None:
             return replace(found, descent=-found.value / float(np.abs(at.program.cost) @ at.program.reach))
         return _within_branch(descent.of(branch), answer, found.zero, found.binaries)
+
+    def _with_binaries(self, sets, at, limits):
+        """HiGHS' answer with a binary for each bi-active pair."""
+        n, y = len(at.program.cost), int(sets.gamma.sum())
+        start = np.concatenate([np.zeros(n), (sets.zero[sets.gamma] == H_ZERO).astype(float)])
+        answer = solve(with_binaries(at.program, at.G, at.H), self._options, self._deadline, start, limits)
+        if answer is None:
+            return LpecResult(False, 0.0, np.zeros(n), sets.zero, y)
+        zero, d = _with(sets, np.where(answer.d[n:] > 0.5, H_ZERO, G_ZERO)), answer.d[:n]
+        return LpecResult(True, min(float(at.program.cost @ d), 0.0), d, zero, y)
 
     def _linearised(self, w, sets, equal, reach, lower, upper, released):
         c = self._c
@@ -217,10 +223,11 @@ class Lpec:
         places = row_places(sets, equal, len(c.lbg))
         low, high = (np.concatenate([np.broadcast_to(v, len(rows)) for v, rows in zip(by, places)]) for by in (low, high))
         settle_drifts(c, (lower == 0.0) & (upper == 0.0) & (np.abs(w) <= AT_ZERO), lower, upper, low, high)
-        weighted = [drift.row for drift in self._undecided_drifts(sets)[0]]
+        drifts = undecided(c.drifts, partial(self._zeros, sets), np.count_nonzero(gamma))
+        weighted = [drift.row for drift in drifts]
         low[weighted], high[weighted] = -np.inf, np.inf
         program = Program(c.gradients(w)[0], c.stacked_jacobian(w)[np.concatenate(places)], low, high, lower, upper, reach)
-        return Linearised(program, equal, G[gamma], H[gamma])
+        return Linearised(program, equal, G[gamma], H[gamma], drifts)
 
     def changes(self, w):
         """Changes of the gradient and of all rows along displacements of all variables by their sizes, within their bounds."""
@@ -262,33 +269,6 @@ class Lpec:
         sides = [G[sets.alpha], H[sets.alpha], H[sets.beta], G[sets.beta]]
         undecided = [G[sets.open], H[sets.open], G[sets.gamma], H[sets.gamma]]
         return np.concatenate([lam[:m], *sides, decided[equal], *undecided])
-
-    def _mixed_integer(self, sets, at, limits):
-        """With a binary for each bi-active pair: G + grad G d - M y <= 0  and  H + grad H d + M y <= M."""
-        p, n, y = at.program, len(at.program.cost), int(sets.gamma.sum())
-        A, high = p.A, p.high
-        if y:
-            J_G, J_H = A[-2 * y : -y], A[-y:]
-            M_G, M_H = _big_m(J_G, at.G, p.lower, p.upper), _big_m(J_H, at.H, p.lower, p.upper)
-            A = _with_binaries(A, J_G, J_H, M_G, M_H)
-            high = np.concatenate([high, -at.G, M_H - at.H])
-        program = Program(
-            np.concatenate([p.cost, np.zeros(y)]),
-            A,
-            np.concatenate([p.low, np.full(2 * y, -np.inf)]),
-            high,
-            np.concatenate([p.lower, np.zeros(y)]),
-            np.concatenate([p.upper, np.ones(y)]),
-            np.concatenate([p.reach, np.ones(y)]),
-            y,
-        )
-        start = np.concatenate([np.zeros(n), (sets.zero[sets.gamma] == H_ZERO).astype(float)])
-        answer = solve(program, self._options, self._deadline, start, limits)
-        zero = sets.zero.copy()
-        if answer is None:
-            return LpecResult(False, 0.0, np.zeros(n), zero, y)
-        zero[sets.gamma] = np.where(answer.d[n:] > 0.5, H_ZERO, G_ZERO)
-        return LpecResult(True, min(float(p.cost @ answer.d[:n]), 0.0), answer.d[:n], zero, y)
 
 
 def _with(sets, sides):
@@ -337,19 +317,3 @@ def _inner_shares(fillings, gamma):
         near = gamma[filling.pairs]
         found.append(filling.shares[~(np.append(near, False) | np.append(False, near))])
     return np.concatenate(found)
-
-
-def _big_m(J, side, d_low, d_high):
-    """The largest value that each side can take in the box."""
-    most = np.maximum(J.data, 0.0) * d_high[J.indices] + np.minimum(J.data, 0.0) * d_low[J.indices]
-    return side + np.bincount(major_index(J), most, J.shape[0])
-
-
-def _with_binaries(A, J_G, J_H, M_G, M_H):
-    """The rows A d,  J_G d - M_G y  and  J_H d + M_H y  of columns (d, y), all csr."""
-    (m, n), y = A.shape, len(M_G)
-    k = np.arange(y)
-    rows = [major_index(A), m + major_index(J_G), m + y + major_index(J_H), m + k, m + y + k]
-    columns, numbers = [A.indices, J_G.indices, J_H.indices, n + k, n + k], [A.data, J_G.data, J_H.data, -M_G, M_H]
-    places = np.concatenate(rows), np.concatenate(columns)
-    return sparse.csc_matrix((np.concatenate(numbers), places), shape=(m + 2 * y, n + y))

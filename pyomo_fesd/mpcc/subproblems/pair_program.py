@@ -72,6 +72,8 @@ class PairProgram:
 
 def undecided(drifts, zeros, pairs):
     """The drifts of which the pairs decide what is zero."""
+    if not drifts:
+        return []
     free = zeros(np.full(pairs, FREE))
     most = zeros(np.full(pairs, G_ZERO)) | zeros(np.full(pairs, H_ZERO))
     return [drift for drift in drifts if gone(drift, free) is None and gone(drift, most) is not None]

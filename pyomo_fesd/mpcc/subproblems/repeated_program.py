@@ -76,7 +76,7 @@ class RepeatedProgram:
 
     def _otherwise(self):
         for settings in OTHERWISE:
-            highs = self._made(settings)
+            highs = self._made({'simplex_iteration_limit': int(FIRST * sum(self._p.A.shape))} | settings)
             self._change(highs, np.flatnonzero(self._high != self._p.high))
             self._ends_well(highs)
             answer = self._answer(highs)
