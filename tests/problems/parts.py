@@ -29,6 +29,7 @@ class Parts:
 
     model: object
     compiled: MpccFunctions
+    setup: Setup
     run: Run
     subsolves: Subsolves
     gap: GapTest
@@ -52,4 +53,4 @@ def parts(model, **options):
     setup = Setup(c, config, HierarchicalTimer(), Deadline(), cache, show=lambda entry: None, after=lambda run: None)
     subsolves = Subsolves(setup, Tolerances.of(config), run)
     gap = GapTest(config.gap_tol * 1e-2, config.gap_tol)
-    return Parts(model, c, run, subsolves, gap, Branches(subsolves, gap, GLOBAL_LPEC_SEARCH[config.lpec](c)))
+    return Parts(model, c, setup, run, subsolves, gap, Branches(subsolves, gap, GLOBAL_LPEC_SEARCH[config.lpec](c)))

@@ -19,6 +19,9 @@ MORE = {FIRST: SECOND, SECOND: None}
 NEAR, NEARER = 1e-2, 0.1
 #: A more even solution may cost this much more, relative: the error of uneven elements, not another minimum.
 AS_GOOD = 1e-4
+#: A branch that is to be below another objective is left where multipliers stay above this, relative to that: where it has a
+#: solution at all, a violation of 1e-4 is worth a tenth of the objective there.
+STEEP = 1e3
 #: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
 #: one it came from an unbounded relaxation.
 UNBOUNDED = 1e15
@@ -91,6 +94,7 @@ class BranchSolutions:
         return Point(found.nlp, found.f, found.certificate, found.equal) if found.certificate.feasible else None
 
     def _solution(self, w, zero, duals, below, **more):
+        more |= {'steepest': STEEP * max(1.0, abs(below))}
         found = self._solve(w, zero, duals, below, **more)
         if found.nlp is not None and not found.nlp.solved and more.get('max_iter') in MORE:
             # feasible, so the branch has a solution, but not at its minimum yet

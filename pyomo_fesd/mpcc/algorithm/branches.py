@@ -53,7 +53,9 @@ class Branches:
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
         self._attempts, self._solved, self._exhausted = Counter(), {}, {}
-        self._patient, self._first = patient, SECOND if patient else FIRST
+        self._patient, self._first = False, FIRST
+        if patient:
+            self.be_patient()
         self.solutions, self.neighbours = BranchSolutions(subsolves, at_once=patient), Neighbours(subsolves)
 
     # called by the algorithm
@@ -221,6 +223,11 @@ class Branches:
         """Whether a branch has had its attempts."""
         return self._attempts[zero.tobytes()] >= TRIES
 
+    def be_patient(self) -> bool:
+        """From now on give a first attempt the iterations of the second one; returns whether it had fewer."""
+        before, self._patient, self._first = self._patient, True, SECOND
+        return not before
+
     def forget(self):
         """Reset the attempts: a branch that failed may succeed from another path."""
         self._attempts.clear()
@@ -247,6 +254,8 @@ class Branches:
         best = self.run.point
         if best is None or (not point.certificate.certified, point.f) < (not best.certificate.certified, best.f):
             self.run.point = point
+        if self.run.lowest is None or point.f < self.run.lowest.f:
+            self.run.lowest = point
 
     def descend(self, point, worth):
         """A better point, or None; a point that is not ``worth`` a descent only gets the check of its certificate."""
@@ -272,7 +281,7 @@ class Branches:
     def _step_down(self, point, enough):
         """In the branch of the direction: from its end, within ever smaller trust regions, or onward from the point."""
         step, w = point.certificate.lpec, point.w
-        better = self._point(w + step.d, step.zero, None, False)
+        better = self._point(w + step.d, step.zero, None, False, below=point.f)
         radius = self._tolerances.radius
         sets = self._subsolves.sets(w, self._tolerances.biactive)
         for _ in range(SHRINKS):
@@ -302,7 +311,7 @@ class Branches:
         step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal, limits=limits, **shown)
         if not step.solved or step.descent <= clear:
             return None
-        better = self._point(point.w + step.d, step.zero, None, False)
+        better = self._point(point.w + step.d, step.zero, None, False, below=point.f)
         return better if is_below(better, enough) else None
 
     def _point(self, w, zero, duals, final, **more):

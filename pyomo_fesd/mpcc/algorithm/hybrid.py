@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pyomo_fesd.core import DeferredInterrupt, interrupt_handled
-from pyomo_fesd.mpcc.algorithm.branches import Branches
+from pyomo_fesd.mpcc.algorithm.branches import PROGRESS, Branches, is_below
 from pyomo_fesd.mpcc.algorithm.coincidences import Coincidences
 from pyomo_fesd.mpcc.algorithm.completions import Completions
 from pyomo_fesd.mpcc.algorithm.evenness import Evenness
@@ -76,6 +76,8 @@ class HybridSolver:
             run.outcome = Outcome.INTERRUPTED
         finally:
             self._c.widen()
+        if run.point is not None:
+            self._take_lowest()
         self._coincidences.mark_untried()
         if run.point is None and self._options.mode == 'hybrid':
             run.point = self._feasible_without_branch()
@@ -102,6 +104,7 @@ class HybridSolver:
             self._from_start()
             self._finish()
             self._try_neighbours_at_last()
+            self._try_lowest_at_last()
         if self.run.point is None:
             return Outcome.INFEASIBLE
         if not self._is_certified():
@@ -134,6 +137,26 @@ class HybridSolver:
         self._branches.try_neighbours()
         if self.run.point is not before:
             self._finish()
+
+    def _try_lowest_at_last(self):
+        """Go on from the lowest point, with patience, where the incumbent is not certified in the end.
+
+        A certified point with orders of changes that stay open has replaced lower ones, of which none counts less than it does now.
+        """
+        point = self.run.point
+        if point is None or point.certificate.certified or not self._c.has_objective:
+            return
+        had_less = self._branches.be_patient() and point.certificate.grade is Stationarity.DESCENT
+        if self._take_lowest() or had_less:
+            self._finish()
+
+    def _take_lowest(self):
+        """Make the lowest point the incumbent, if that is not certified and clearly above; returns whether it was."""
+        point, lowest = self.run.point, self.run.lowest
+        if lowest is None or point.certificate.certified or not is_below(lowest, point.f - PROGRESS * max(1.0, abs(point.f))):
+            return False
+        self.run.point = lowest
+        return True
 
     def _descend_at_last(self):
         """Descend from a point that was not worth it on the way, as the homotopy promised better ones that it did not find."""

@@ -171,6 +171,8 @@ class Run:
         without an incumbent, the best point of a relaxation at which rows and pairs hold
     point : Point or None
         the incumbent
+    lowest : Point or None
+        the point of the least objective, which a certified incumbent may have replaced
     counts : Counts
     eps : float
         the last relaxation parameter
@@ -185,6 +187,7 @@ class Run:
     w: Optional[np.ndarray] = None
     complementary: Optional[np.ndarray] = None
     point: Optional[Point] = None
+    lowest: Optional[Point] = None
     counts: Counts = field(default_factory=Counts)
     eps: Optional[float] = None
     steps: list = field(default_factory=list)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pyomo_fesd.core import DeferredInterrupt, phase
 from pyomo_fesd.mpcc.algorithm.state import LogEntry, Outcome, Run, Setup, Stop, Tolerances
-from pyomo_fesd.mpcc.nlp import nlp_solver
+from pyomo_fesd.mpcc.nlp import DIVERGING, nlp_solver
 from pyomo_fesd.mpcc.subproblems import (
     RELAXATIONS,
     Branch,
@@ -135,11 +135,10 @@ class Subsolves:
         Where the NLP did not reach its solution a certificate is unlikely, and its LPEC may take longer than all NLPs: it stops
         early.
         """
-        started, lpec = time.perf_counter(), self._lpec
-        if not nlp.solved:
-            lpec = lpec.until(self._setup.deadline.at_most(self.patience()['time_limit']))
+        started, seconds = time.perf_counter(), self.patience()['time_limit']
+        lpec = self._lpec.at_most(None if nlp.solved else seconds)
         with phase(self._setup.timer, 'lpec'):
-            certificate = certify_point(self._c, lpec, nlp.w, self.tolerances, equal, -nlp.lam_g)
+            certificate = certify_point(self._c, lpec, nlp.w, self.tolerances, equal, -nlp.lam_g, seconds)
         if certificate.lpec is not None:
             self._count(certificate.lpec)
         self._log('certificate', 0.0, nlp.w, 0, certificate.grade.name, started)
@@ -169,7 +168,7 @@ class Subsolves:
     def usable(self, result):
         """Whether an NLP's point can be used: solved, or stopped where the model's constraints hold, but not as infeasible."""
         most = min(LEFT, self.tolerances.feasibility) if result.status == STUCK else self.tolerances.feasibility
-        return result.solved or (result.status not in INFEASIBLE and self.violation(result.w) <= most)
+        return result.solved or (result.status not in (*INFEASIBLE, DIVERGING) and self.violation(result.w) <= most)
 
     def violation(self, w):
         """The largest violation of rows and bounds."""

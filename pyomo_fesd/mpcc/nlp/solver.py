@@ -44,6 +44,9 @@ SOLVED = (
 )
 #: Status of a run that a limit of iterations or time has stopped.
 STOPPED = ('User_Requested_Stop', 'Maximum_Iterations_Exceeded', 'iteration or time limit', 'maxIterations')
+#: Status of a run that was stopped as rows seem to contradict each other: in so many iterations running one was violated by more
+#: than the second, and a multiplier was above the limit of the call.
+DIVERGING, RUNNING, VIOLATED = 'Multipliers_Diverge', 30, 1e-8
 #: A row without variables may miss its bounds by this much.
 ROW_TOLERANCE = 1e-8
 #: ``nlp_solver`` -> module, class, how to install it; every other name is an executable.
@@ -129,7 +132,7 @@ class NlpSolver(ABC):
         pass
 
     @abstractmethod
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf):
         """Solve from ``w0``; an unsolved problem gives a status, never an error.
 
         Infinite bounds are ``np.inf``; a row or variable with two of them is free, one with equal bounds is an equation or fixed.
@@ -140,6 +143,8 @@ class NlpSolver(ABC):
             multipliers to start from, where the solver can use them
         max_iter : int, optional
             iterations that this call may use, where they can be counted
+        steepest : float
+            limit of the multipliers of rows, where the solver shows them on its way: with larger ones, it ends as ``DIVERGING``
 
         Returns
         -------

@@ -59,7 +59,7 @@ class Branch:
         exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': max(OPTIMALITY * min(1.0, c.scale.f), LEAST)}
         self._nlp, self._far = (make('branch', *given, budget, nlp.derivatives) for budget in (NEAR | exact, exact))
 
-    def solve(self, w, zero, equal=None, weight=0.0, box=None, duals=None, max_iter=None, settled=ROW_TOLERANCE, far=False):
+    def solve(self, w, zero, equal=None, weight=0.0, settled=ROW_TOLERANCE, far=False, box=None, **more):
         """Solve the branch ``zero`` from ``w``.
 
         Parameters
@@ -70,40 +70,39 @@ class Branch:
             decisions to impose
         weight : float
             1 to keep the penalty terms in the objective, 0 to leave them out
-        box : (array, array), optional
-            a trust region: bounds of w besides its own
-        duals : NlpResult, optional
-            a relaxation's or branch's result whose multipliers to start from
-        max_iter : int, optional
         settled : float
             violation of rows without free variables that is accepted
         far : bool
             whether ``w`` may be far from the solution
+        box : (array, array), optional
+            a trust region: bounds of w besides its own
+        more : ``max_iter`` and ``steepest`` of ``NlpSolver.solve``; ``duals``, the result of a relaxation or branch with the
+            multipliers to start from
 
         Returns
         -------
         NlpResult, or None if the assignment contradicts the bounds
         """
-        options = equal, weight, box, duals, max_iter, settled, far
-        result = self._solve(w, zero, *options)
+        options = equal, weight, settled, far, box
+        result = self._solve(w, zero, *options, **more)
         if not self._c.fillings or (result is not None and result.solved):
             return result
-        return self._solve_refilled(w, zero, result, options)
+        return self._solve_refilled(w, zero, result, options, more)
 
-    def _solve_refilled(self, w, zero, result, options):
+    def _solve_refilled(self, w, zero, result, options, more):
         """Solve the branch with the sides of fillings that its places show once they satisfy the decisions.
 
         Where that fails, a solution with open fillings shows that the branch may have one with other sides.
         """
-        pairs, (equal, _, box, *_) = np.concatenate([f.pairs for f in self._c.fillings]), options
+        pairs, (equal, *_, box) = np.concatenate([f.pairs for f in self._c.fillings]), options
         if np.any(zero[pairs] == FREE):
             return result
-        again = self._solve(self._with_decisions(w, equal, box), zero, *options)
+        again = self._solve(self._with_decisions(w, equal, box), zero, *options, **more)
         if again is not None and again.solved:
             return again
         without = zero.copy()
         without[pairs] = FREE
-        free = self._solve(w, without, *options)
+        free = self._solve(w, without, *options, **more)
         return result if free is None or not free.solved else replace(result or free, status=UNDECIDED)
 
     def _with_decisions(self, w, equal, box):
@@ -121,7 +120,7 @@ class Branch:
         new[extents] += np.linalg.lstsq(A, np.concatenate([(c.lbg - at.g)[own], -c.decided(w)[equal]]), rcond=None)[0]
         return np.clip(new, c.lbx, c.ubx)
 
-    def _solve(self, w, zero, equal, weight, box, duals, max_iter, settled, far):
+    def _solve(self, w, zero, equal, weight, settled, far, box, duals=None, **limits):
         c = self._c
         zero, w = settle(c, self._sides, w, zero), with_shares(c.fillings, w)
         bounds = self._bounds(zero)
@@ -141,7 +140,7 @@ class Branch:
             free = lbx < ubx
             lbx, ubx = np.where(free, np.maximum(lbx, box[0]), lbx), np.where(free, np.minimum(ubx, box[1]), ubx)
         nlp = self._far if far else self._nlp
-        result = nlp.solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, self._start(duals), max_iter)
+        result = nlp.solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, self._start(duals), **limits)
         return replace(result, w=self._differences.parted(result.w, joined))
 
     def on_sides(self, w, zero):

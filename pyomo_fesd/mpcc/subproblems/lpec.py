@@ -111,10 +111,10 @@ class Lpec:
         self._c, self._sides, self._options, self._deadline = compiled, sides, options, deadline or Deadline()
         self._known_changes = LastPoints(self._changes)
 
-    def until(self, deadline):
-        """The same LPECs with a deadline of their own."""
+    def at_most(self, seconds):
+        """The same LPECs, with so many seconds from now on; None: as they are."""
         other = copy(self)
-        other._deadline = deadline
+        other._deadline = self._deadline if seconds is None else self._deadline.at_most(seconds)
         return other
 
     def solve(self, w, sets, Delta, equal=None, beyond=False, multipliers=None, enough=None, limits=None) -> LpecResult:

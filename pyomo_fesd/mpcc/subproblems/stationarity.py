@@ -69,7 +69,7 @@ class Certificate:
         return self.grade is not Stationarity.INFEASIBLE
 
 
-def certify_point(c, lpec, w, tolerances, equal=None, multipliers=None) -> Certificate:
+def certify_point(c, lpec, w, tolerances, equal=None, multipliers=None, patience=None) -> Certificate:
     """Judge the point ``w`` of a compiled MPCC.
 
     Parameters
@@ -80,7 +80,8 @@ def certify_point(c, lpec, w, tolerances, equal=None, multipliers=None) -> Certi
         decisions in force at ``w``; None reads them from eta
     multipliers : array or None
         of the branch NLP's rows (positive at lower bounds), which may make the LPEC unnecessary
-
+    patience : float or None
+        seconds for the question whether only guide bounds stop a descent: a proof of it may take longer than all NLPs
     """
     at, gradients = c.evaluate(w), c.gradients(w)
     sets, measures = _residuals(c, at, w, tolerances, gradients)
@@ -94,7 +95,9 @@ def certify_point(c, lpec, w, tolerances, equal=None, multipliers=None) -> Certi
     result = lpec.solve(w, sets, tolerances.radius, equal, beyond=True, multipliers=multipliers, enough=enough)
     without_descent = Stationarity.B
     if result.descent > enough and c.guided.any():
-        result, without_descent = lpec.solve(w, sets, tolerances.radius, equal, enough=enough), Stationarity.LIMITED
+        within = lpec.at_most(patience).solve(w, sets, tolerances.radius, equal, enough=enough)
+        if within.solved:
+            result, without_descent = within, Stationarity.LIMITED
     grade = Stationarity.DESCENT if result.descent > enough else without_descent if result.solved else Stationarity.UNSOLVED
     return Certificate(grade, result.value / c.scale.f, result, *measures)
 

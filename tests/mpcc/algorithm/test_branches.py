@@ -12,6 +12,7 @@ from pyomo.mpec import Complementarity, complements
 from pyomo_fesd.core import BranchConstraint, homotopy_hints
 from pyomo_fesd.mpcc.algorithm import branch_solutions, branches
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Stop
+from pyomo_fesd.mpcc.nlp import DIVERGING
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO, active_sets
 from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
 
@@ -294,6 +295,28 @@ def test_from_a_branch_that_did_not_end_only_large_steps_are_worth_it(monkeypatc
         assert (p.branches.descend(unfinished, True) is not None) == found
     p.branches.forget()
     assert p.branches.descend(point, True).f == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize('below', [np.inf, 50.0])
+def test_only_a_branch_that_is_to_be_better_is_left_where_its_multipliers_diverge(monkeypatch, below):
+    p = parts(two_minima(1.0, 0.0))
+    attempt, limits = p.subsolves.attempt, []
+
+    def diverging(*given, steepest, **options):
+        limits.append(steepest)
+        result = attempt(*given, **options)
+        return replace(result, status=DIVERGING) if steepest < np.inf else result
+
+    monkeypatch.setattr(p.subsolves, 'attempt', diverging)
+    # the point is feasible, but a solver that gave it up is not believed
+    point = p.branches.solutions.certified(p.compiled.x0, np.array([H_ZERO]), below=below)
+    assert (point is None) == (below < np.inf)
+    assert limits == [branch_solutions.STEEP * below]
+
+
+def test_patience_is_told_once():
+    p = parts(trap(), lpec='reduced')
+    assert [p.branches.be_patient(), p.branches.be_patient()] == [True, False]
 
 
 # Neighbouring branches of a moving grid

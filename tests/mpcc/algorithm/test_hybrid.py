@@ -1,6 +1,7 @@
 """The algorithm on published problems, and against enumeration of all branches on random ones."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pyomo.environ as pyo
@@ -14,9 +15,11 @@ from pyomo.mpec import Complementarity, complements
 from scipy.optimize import linprog
 
 import pyomo_fesd
+from pyomo_fesd.mpcc.algorithm import hybrid
 from pyomo_fesd.mpcc.algorithm.branches import Branches
 from pyomo_fesd.mpcc.algorithm.hybrid import HybridSolver
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Stop
+from pyomo_fesd.mpcc.subproblems import G_ZERO, H_ZERO, Stationarity
 
 SOLVER = 'mpec_hybrid'
 
@@ -201,3 +204,36 @@ def test_a_limit_before_all_orders_are_tried_leaves_a_certificate_only_where_the
     results = solve(build())
     assert results.solver.termination_condition == pyo.TerminationCondition.maxTimeLimit
     assert results.solver.stationarity == stationarity
+
+
+def with_two_points(monkeypatch, is_certified):
+    """A solver with the incumbent (0, 1) of 1, certified or with open orders, which has replaced (1, 0) of 1/2."""
+    model = small_mpccs.pair(1.0, 0.0)
+    model.f = pyo.Objective(expr=(model.x - 1) ** 2 + (model.y - 1) ** 2 / 2)
+    p = parts(model)
+    solver = HybridSolver(p.setup)
+    low, high = (
+        p.branches.solutions.certified(np.array(p.point(x=x, y=1.0 - x)), np.array([k])) for x, k in ((1.0, H_ZERO), (0.0, G_ZERO))
+    )
+    if not is_certified:
+        high = replace(high, certificate=replace(high.certificate, grade=Stationarity.OPEN))
+    solver.run.point, solver.run.lowest = high, low
+
+    def stop(self):
+        raise Stop(Outcome.TIME_LIMIT)
+
+    monkeypatch.setitem(hybrid.MODES, 'hybrid', stop)
+    return solver
+
+
+@pytest.mark.parametrize('is_certified, f', [(True, 1.0), (False, 0.5)])
+def test_the_lowest_point_is_the_answer_where_none_is_certified_in_the_end(monkeypatch, is_certified, f):
+    solver = with_two_points(monkeypatch, is_certified)
+    assert solver.solve().point.f == pytest.approx(f)
+
+
+@pytest.mark.parametrize('is_certified, f', [(True, 1.0), (False, 0.5)])
+def test_it_is_gone_on_from(monkeypatch, is_certified, f):
+    solver = with_two_points(monkeypatch, is_certified)
+    solver._try_lowest_at_last()
+    assert solver.run.point.f == pytest.approx(f) and solver.run.point.certificate.certified

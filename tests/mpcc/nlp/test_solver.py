@@ -11,7 +11,7 @@ import pytest
 from pyomo_fesd import FesdError
 from pyomo_fesd.mpcc.compile.derivatives import automatic
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
-from pyomo_fesd.mpcc.nlp.solver import NLP_SOLVERS, NlpSolver, nlp_solver
+from pyomo_fesd.mpcc.nlp.solver import DIVERGING, NLP_SOLVERS, RUNNING, NlpSolver, nlp_solver
 
 SOLVERS = ['ipopt', 'uno', 'cyipopt', 'pounce']
 #: The limit of iterations in each solver's own words.
@@ -122,6 +122,17 @@ def test_budget_limits_iterations(solver):
     result = valley(solver, budget={'max_iter': 2})
     assert not result.solved
     assert result.iterations == 2
+
+
+@pytest.mark.parametrize(('steepest', 'diverges'), [(0.0, True), (1e9, False), (INF, False)])
+def test_multipliers_that_stay_above_their_limit_end_the_solve(steepest, diverges):
+    # Newton's method goes a sixteenth of the way to the root of x^16 in each iteration
+    x, p = ca.SX.sym('x'), ca.SX(0, 1)
+    problem = nlp_solver('ipopt')('flat', x, p, x, x**16, {'max_iter': 300})
+    result = problem.solve(np.array([10.0]), [], np.array([-INF]), np.array([INF]), np.zeros(1), np.zeros(1), steepest=steepest)
+    assert (result.status == DIVERGING) == diverges
+    if diverges:
+        assert result.iterations < RUNNING and not (result.solved or result.stopped)
 
 
 def test_options_of_the_user_pass_through_and_win(solver):
