@@ -15,6 +15,8 @@ from pyomo_fesd.mpcc.nlp import NlpResult
 #: Iterations of the first and of the second attempt; and how many more if they only lead to a feasible point (None: no limit).
 FIRST, SECOND = 30, 100
 MORE = {FIRST: SECOND, SECOND: None}
+#: Times that a branch with the decisions of its sides is solved again with those that its solution asks for.
+ASKED = 2
 #: A failed attempt came near if it leaves a violation of the rows below this, or has reduced it to this part.
 NEAR, NEARER = 1e-2, 0.1
 #: A more even solution may cost this much more, relative: the error of uneven elements, not another minimum.
@@ -77,14 +79,20 @@ class BranchSolutions:
 
         A direction of the LPEC at the point is one with these decisions.
         """
-        solved = self._subsolves.branch(point.w, zero, point.equal, 0.0)
-        if solved is None or self._asks_for_more(solved.w, point.equal):
-            return None
-        return self._point(self._measured(_Solution(nlp=solved, equal=point.equal)), np.inf, enough)
+        solved, equal = self._with_all(self._subsolves.branch(point.w, zero, point.equal, 0.0), zero, point.equal)
+        return None if solved is None else self._point(self._measured(_Solution(nlp=solved, equal=equal)), np.inf, enough)
 
-    def _asks_for_more(self, w, equal):
-        """Whether a solution asks for decisions that were not imposed."""
-        return bool(np.any((self._c.evaluate(w).eta > self._tolerances.eta) & ~equal))
+    def _with_all(self, solved, zero, equal, left=ASKED, **more):
+        """A solution with the decisions ``equal``, and solved again with those that it asks for as well; none that still asks."""
+        if solved is None:
+            return None, None
+        asked = (self._c.evaluate(solved.w).eta > self._tolerances.eta) & ~equal
+        if not asked.any():
+            return solved, equal
+        if not left:
+            return None, None
+        again = self._subsolves.branch(solved.w, zero, equal | asked, 0.0, **more | {'duals': solved})
+        return self._with_all(again, zero, equal | asked, left - 1, **more)
 
     def _point(self, found, below, enough):
         if found.nlp is None or _is_clearly_above(found.f, below) or found.f > enough:
@@ -146,15 +154,12 @@ class BranchSolutions:
         return self._decided_by_sides(w, zero, far=True, **more | {'max_iter': None})
 
     def _decided_by_sides(self, w, zero, **more):
-        """The NLP of a branch with the decisions that its sides ask for; a solution that asks for others does not count."""
+        """The NLP of a branch with the decisions that its sides ask for, and then with those that its solution asks for."""
         at_sides = self._subsolves.on_sides(w, zero)
         if at_sides is None:
             return None, None
         equal = self._c.evaluate(at_sides).eta > self._tolerances.eta
-        solved = self._subsolves.branch(w, zero, equal, 0.0, **more)
-        if solved is None or self._asks_for_more(solved.w, equal):
-            return None, None
-        return solved, equal
+        return self._with_all(self._subsolves.branch(w, zero, equal, 0.0, **more), zero, equal, **more)
 
     def decided(self, first, zero, apart=False, **more):
         """The second NLP, after the solution ``first`` of a branch, and the decisions in force; none of ``apart``."""

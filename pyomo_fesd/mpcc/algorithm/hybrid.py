@@ -149,6 +149,15 @@ class HybridSolver:
         had_less = self._branches.be_patient() and point.certificate.grade is Stationarity.DESCENT
         if self._take_lowest() or had_less:
             self._finish()
+        self._certify_at_last()
+
+    def _certify_at_last(self):
+        """Certify the incumbent in all the time that is left, where its LPEC was stopped early."""
+        point = self.run.point
+        if point.certificate.grade is Stationarity.UNSOLVED and point.nlp.solved:
+            certificate = self._subsolves.certify(point.nlp, point.equal, at_last=True)
+            self.run.point = replace(point, certificate=certificate)
+            self._finish()
 
     def _take_lowest(self):
         """Make the lowest point the incumbent, if that is not certified and clearly above; returns whether it was."""

@@ -129,14 +129,14 @@ class Subsolves:
         spent = sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch'))
         return {'time_limit': max(LEAST_TIME, SHARE * spent)}
 
-    def certify(self, nlp, equal):
+    def certify(self, nlp, equal, at_last=False):
         """Certify the end of a branch NLP, whatever the limits; HiGHS stops at the deadline.
 
-        Where the NLP did not reach its solution a certificate is unlikely, and its LPEC may take longer than all NLPs: it stops
-        early.
+        Where the NLP did not reach its solution exactly a certificate is unlikely, and its LPEC may take longer than all NLPs: it
+        stops early, unless the run ends with this point.
         """
         started, seconds = time.perf_counter(), self.patience()['time_limit']
-        lpec = self._lpec.at_most(None if nlp.solved else seconds)
+        lpec = self._lpec.at_most(None if nlp.is_exact or at_last else seconds)
         with phase(self._setup.timer, 'lpec'):
             certificate = certify_point(self._c, lpec, nlp.w, self.tolerances, equal, -nlp.lam_g, seconds)
         if certificate.lpec is not None:

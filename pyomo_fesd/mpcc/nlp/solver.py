@@ -34,10 +34,11 @@ IPOPT = {
 IPOPT_WARM = {'warm_start_init_point': 'yes'} | {
     f'warm_start_{name}': 1e-6 for name in ('bound_push', 'bound_frac', 'slack_bound_push', 'slack_bound_frac', 'mult_bound_push')
 }
-#: Status of a stationary, feasible point: Ipopt's, Uno's, and Pyomo's for an executable.
+#: Status of a stationary, feasible point: Ipopt's, Uno's, and Pyomo's for an executable; the first one is to looser tolerances.
+ACCEPTABLE = 'Solved_To_Acceptable_Level'
 SOLVED = (
     'Solve_Succeeded',
-    'Solved_To_Acceptable_Level',
+    ACCEPTABLE,
     'Feasible_Point_Found',
     'Converged with feasible KKT point',
     'optimal',
@@ -85,6 +86,11 @@ class NlpResult:
     def solved(self):
         """Whether the solver reports a stationary, feasible point."""
         return self.status in SOLVED
+
+    @property
+    def is_exact(self):
+        """Whether it is one to the tolerances that were asked for."""
+        return self.solved and self.status != ACCEPTABLE
 
     @property
     def stopped(self):

@@ -113,10 +113,15 @@ def solve(program, options, deadline, start=None, limits=None):
 def highs_of(p, settings):
     """HiGHS with an equilibrated program and these settings."""
     highs = highspy.Highs()
-    for name, option in settings.items():
-        highs.setOptionValue(name, option)
+    set_options(highs, settings)
     highs.passModel(_highs_model(p))
     return highs
+
+
+def set_options(highs, settings):
+    """Give HiGHS these options."""
+    for name, option in settings.items():
+        highs.setOptionValue(name, option)
 
 
 def refusal(options: dict) -> str | None:

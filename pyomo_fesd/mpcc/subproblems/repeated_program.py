@@ -5,14 +5,20 @@ Leaves: its optimum; or a point and multipliers as HiGHS gave them, of which not
 """
 
 from dataclasses import replace
+from itertools import cycle
 
 import highspy
 import numpy as np
 
-from pyomo_fesd.mpcc.subproblems.linear_program import ATTEMPTS, Answer, highs_of, holds, run, settings_of, solve
+from pyomo_fesd.mpcc.subproblems.linear_program import ATTEMPTS, Answer, highs_of, holds, run, set_options, settings_of, solve
 
 #: Iterations of the simplex method before the next attempt, for each row and column: without a basis, and from the last one.
 FIRST, AGAIN = 1.0, 0.1
+#: Settings of the simplex method, each for as long as it ends: on degenerate programs, equilibrated already, either may not.
+WAYS = (
+    {'simplex_scale_strategy': 0, 'dual_simplex_cost_perturbation_multiplier': 1.0},
+    {'simplex_scale_strategy': 2, 'dual_simplex_cost_perturbation_multiplier': 0.0},
+)
 #: Ways to multipliers where the simplex method does not end.
 OTHERWISE = {'solver': 'ipm', 'run_crossover': 'off'}, {'presolve': 'on'}
 
@@ -31,8 +37,8 @@ class RepeatedProgram:
     def __init__(self, program, options, deadline):
         self._given, self._options, self._deadline = program, options, deadline
         self._p, self._rows, self._factor = program.equilibrated()
-        self._high, self._limit = self._p.high, FIRST
-        self._highs, self._basis = self._made({}), None
+        self._high, self._limit, self._ways = self._p.high, FIRST, cycle(WAYS)
+        self._highs, self._basis = self._made(next(self._ways)), None
 
     def solve(self, high):
         """An ``Answer`` with the upper bounds ``high`` of the rows, of which nothing is promised; None where HiGHS has none."""
@@ -60,6 +66,7 @@ class RepeatedProgram:
             return self._answer(self._highs)
         # the basis in which it ended leads nowhere
         self.restart(self._basis)
+        set_options(self._highs, next(self._ways) | self._options)
         return None
 
     @property

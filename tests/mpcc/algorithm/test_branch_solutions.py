@@ -29,3 +29,21 @@ def test_multipliers_say_what_a_violation_is_worth(violation):
     assert owed == pytest.approx(sum(lam * rows), abs=1e-12) and (owed > 0) == (violation != 0)
     # x below its bound violates both rows, above it only the equation
     assert np.count_nonzero(rows) == {0.0: 0, 1e-7: 1, -1e-7: 2}[violation]
+
+
+@pytest.mark.parametrize('asked, found', [([], True), ([1], True), ([1, 2], True), ([1, 2, 3], False)])
+def test_decisions_that_a_solution_asks_for_are_added_some_times(asked, found):
+    def solution(k):
+        return SimpleNamespace(w=np.eye(4)[k])
+
+    # the last one asks for what is imposed already
+    rest = [solution(k) for k in (*asked, 0)]
+    subsolves = SimpleNamespace(
+        compiled=SimpleNamespace(evaluate=lambda w: SimpleNamespace(eta=w), eta=SimpleNamespace(numel=lambda: 4)),
+        tolerances=SimpleNamespace(eta=0.5),
+        branch=lambda w, zero, equal, weight, duals: rest.pop(0),
+    )
+    solved, equal = BranchSolutions(subsolves)._with_all(rest.pop(0), None, np.array([True, False, False, False]))
+    assert (solved is not None) == found
+    if found:
+        assert not rest and np.flatnonzero(equal).tolist() == [0, *asked]

@@ -11,7 +11,7 @@ import pytest
 from pyomo_fesd import FesdError
 from pyomo_fesd.mpcc.compile.derivatives import automatic
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
-from pyomo_fesd.mpcc.nlp.solver import DIVERGING, NLP_SOLVERS, RUNNING, NlpSolver, nlp_solver
+from pyomo_fesd.mpcc.nlp.solver import ACCEPTABLE, DIVERGING, NLP_SOLVERS, RUNNING, SOLVED, NlpResult, NlpSolver, nlp_solver
 
 SOLVERS = ['ipopt', 'uno', 'cyipopt', 'pounce']
 #: The limit of iterations in each solver's own words.
@@ -183,3 +183,10 @@ def test_table_names_classes_that_exist():
     for module, kind, _ in NLP_SOLVERS.values():
         if module != 'cyipopt_solver':
             assert issubclass(getattr(importlib.import_module(f'pyomo_fesd.mpcc.nlp.{module}'), kind), NlpSolver)
+
+
+def test_a_solution_to_acceptable_tolerances_is_solved_but_not_exact():
+    found = {
+        status: NlpResult(np.zeros(1), 0.0, status, 1, np.zeros(0), np.zeros(1)) for status in (SOLVED[0], ACCEPTABLE, DIVERGING)
+    }
+    assert [(one.solved, one.is_exact) for one in found.values()] == [(True, True), (True, False), (False, False)]
