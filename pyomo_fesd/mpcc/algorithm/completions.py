@@ -18,8 +18,8 @@ from pyomo_fesd.mpcc.subproblems import Stationarity
 
 #: Smallest eps of a relaxation that is worth a completion, and the eps of those around the best point.
 LAST, AROUND = 1e-3, (1e-1, 1e-2)
-#: Part of ``relaxation_iterations`` that a relaxation may use: many do not end, and a point on the way is as good.  With half of
-#: this two of two starts of three carts ended worse, one of them where almost nothing pushes.
+#: Part of ``relaxation_iterations`` that a relaxation may use after one of its path has not reached its solution: then most do not,
+#: and the completion of a point on the way is as good.
 BUDGET = 0.4
 #: Times that relaxations go around the best point at most, and the part by which its objective must fall to go on.
 CYCLES, PROGRESS = 6, 1e-3
@@ -62,14 +62,14 @@ class Completions:
         self._subsolves, self._branches, self.run = subsolves, branches, subsolves.run
         form = self._options.relaxation
         self._paths = PATHS.get(form) or tuple((form, looser) for looser in LOOSER)
-        self._form = self._paths[0][0]
+        self._form, self._share = self._paths[0][0], 1.0
         self._deadline, self._promise, self._possible = setup.deadline.part(SHARE), -np.inf, False
         self._objectives, self._around, self._best = [], set(), None
 
     def follow(self, start):
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
         for form, looser in self._paths:
-            self._form, self._best = form, None
+            self._form, self._best, self._share = form, None, 1.0
             solved, is_infeasible = self._down(start, self._options.eps_init * looser)
             if is_infeasible and (form, looser) != self._paths[-1]:
                 # it led away from all solutions: the next path has more to go on from
@@ -137,7 +137,8 @@ class Completions:
         """
         self.run.eps = eps
         began = time.perf_counter()
-        relaxed = self._subsolves.relax(self._form, w, eps, None, int(BUDGET * self._options.relaxation_iterations))
+        relaxed = self._subsolves.relax(self._form, w, eps, None, int(self._share * self._options.relaxation_iterations))
+        self._share = BUDGET if relaxed.stopped else self._share
         self._subsolves.keep_least_infeasible(relaxed.w)
         if eps <= AROUND[0] * ROUND_OFF and self._subsolves.usable(relaxed):
             self._promise = self._c.evaluate(relaxed.w).f
