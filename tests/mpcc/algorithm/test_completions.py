@@ -9,7 +9,7 @@ import pytest
 from problems import small_mpccs
 from problems.parts import parts
 
-from pyomo_fesd.mpcc.algorithm.completions import AROUND, Completions
+from pyomo_fesd.mpcc.algorithm.completions import AROUND, BUDGET, Completions
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
 from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
 from pyomo_fesd.solvers.options import MpecHybridConfig
@@ -90,6 +90,20 @@ def test_no_relaxation_follows_an_infeasible_one(monkeypatch):
     monkeypatch.setattr(p.subsolves, 'relax', lambda *args: replace(relax(*args), status='Infeasible_Problem_Detected'))
     rounds._down(p.compiled.x0, 1.0)
     assert len(p.kinds('relaxation')) == 1
+
+
+def test_after_a_relaxation_that_was_stopped_those_of_its_path_have_fewer_iterations(monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    relax, given = p.subsolves.relax, []
+
+    def stopped_at_the_second_eps(form, w, eps, duals, most):
+        given.append(most)
+        result = relax(form, w, eps, duals, most)
+        return replace(result, status='User_Requested_Stop') if len(given) == 2 else result
+
+    monkeypatch.setattr(p.subsolves, 'relax', stopped_at_the_second_eps)
+    rounds._down(p.compiled.x0, 1.0)
+    assert given == [500, 500, 500 * BUDGET, 500 * BUDGET]
 
 
 def test_a_path_that_ends_infeasible_is_followed_by_one_of_the_other_form(monkeypatch):
