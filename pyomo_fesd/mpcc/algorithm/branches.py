@@ -53,9 +53,7 @@ class Branches:
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
         self._attempts, self._solved, self._exhausted = Counter(), {}, {}
-        self._patient, self._first = False, FIRST
-        if patient:
-            self.be_patient()
+        self._patient = patient
         self.solutions, self.neighbours = BranchSolutions(subsolves, at_once=patient), Neighbours(subsolves)
 
     # called by the algorithm
@@ -225,8 +223,13 @@ class Branches:
 
     def be_patient(self) -> bool:
         """From now on give a first attempt the iterations of the second one; returns whether it had fewer."""
-        before, self._patient, self._first = self._patient, True, SECOND
-        return not before
+        had_fewer, self._patient = not self._patient, True
+        return had_fewer
+
+    @property
+    def _first(self):
+        """The iterations of a first attempt."""
+        return SECOND if self._patient else FIRST
 
     def forget(self):
         """Reset the attempts: a branch that failed may succeed from another path."""

@@ -149,15 +149,17 @@ class HybridSolver:
         had_less = self._branches.be_patient() and point.certificate.grade is Stationarity.DESCENT
         if self._take_lowest() or had_less:
             self._finish()
-        self._certify_at_last()
-
-    def _certify_at_last(self):
-        """Certify the incumbent in all the time that is left, where its LPEC was stopped early."""
-        point = self.run.point
-        if point.certificate.grade is Stationarity.UNSOLVED and point.nlp.solved:
-            certificate = self._subsolves.certify(point.nlp, point.equal, at_last=True)
-            self.run.point = replace(point, certificate=certificate)
+        if self._certify_at_last():
             self._finish()
+
+    def _certify_at_last(self) -> bool:
+        """Certify the incumbent in all the time that is left, where its LPEC was stopped early; return whether it was."""
+        point = self.run.point
+        if point is None or point.certificate.grade is not Stationarity.UNSOLVED or not point.nlp.solved:
+            return False
+        certificate = self._subsolves.certify(point.nlp, point.equal, at_last=True)
+        self.run.point = replace(point, certificate=certificate)
+        return True
 
     def _take_lowest(self):
         """Make the lowest point the incumbent, if that is not certified and clearly above; returns whether it was."""
@@ -264,6 +266,8 @@ class HybridSolver:
         self._subsolves.keep_least_infeasible(self._c.x0)
         if not self._branches.explore_decided(self._c.x0):
             self._branches.explore_from(self._c.x0, False)
+        # its values say where to look: nothing else may follow (``ONLY``), or the homotopy, which takes longer
+        self._certify_at_last()
         return self._is_certified()
 
     def _start_is_better(self):

@@ -35,6 +35,8 @@ INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
 #: Status where Ipopt cannot make the violation smaller, and the violation from which on its point is none: a multiplier may be so
 #: large that the objective owes all to what is left, as with a force of 1e7 at a gap of 1e-8.
 STUCK, LEFT = 'Restoration_Failed', 1e-8
+#: Statuses with which a point is of no use, whatever its violation.
+USELESS = (*INFEASIBLE, DIVERGING)
 #: Iterations that an NLP may use; a relaxation without multipliers to start from may use more.
 COLD = 4
 ITERATIONS = {
@@ -168,7 +170,7 @@ class Subsolves:
     def usable(self, result):
         """Whether an NLP's point can be used: solved, or stopped where the model's constraints hold, but not as infeasible."""
         most = min(LEFT, self.tolerances.feasibility) if result.status == STUCK else self.tolerances.feasibility
-        return result.solved or (result.status not in (*INFEASIBLE, DIVERGING) and self.violation(result.w) <= most)
+        return result.solved or (result.status not in USELESS and self.violation(result.w) <= most)
 
     def violation(self, w):
         """The largest violation of rows and bounds."""

@@ -237,3 +237,11 @@ def test_it_is_gone_on_from(monkeypatch, is_certified, f):
     solver = with_two_points(monkeypatch, is_certified)
     solver._try_lowest_at_last()
     assert solver.run.point.f == pytest.approx(f) and solver.run.point.certificate.certified
+
+
+def test_a_certificate_that_was_stopped_early_is_made_at_last(monkeypatch):
+    solver = with_two_points(monkeypatch, True)
+    point = solver.run.point
+    solver.run.point = replace(point, certificate=replace(point.certificate, grade=Stationarity.UNSOLVED))
+    assert solver._certify_at_last() and solver.run.point.certificate.certified
+    assert not solver._certify_at_last()

@@ -3,10 +3,13 @@
 import pyomo.environ as pyo
 import pytest
 from problems import small_mpccs
+from problems.parts import parts
 
 import pyomo_fesd
-from pyomo_fesd.core import FesdError
-from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
+from pyomo_fesd.core import FesdError, homotopy_hints
+from pyomo_fesd.mpcc.subproblems.lpec import Lpec
+from pyomo_fesd.mpcc.subproblems.side_constraints import sort_sides
+from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity, certify_point
 
 
 def test_the_origin_of_the_toy_is_refused_with_a_direction_of_descent():
@@ -60,3 +63,16 @@ def test_a_model_without_values_is_not_judged():
     model.y.value = None
     with pytest.raises(FesdError, match=r'(?s)y: has no value that could be judged\n.*solve the model first'):
         pyomo_fesd.certify(model)
+
+
+@pytest.mark.parametrize('patience, grade', [(None, Stationarity.LIMITED), (0.0, Stationarity.DESCENT)])
+def test_without_time_a_point_that_only_a_guide_bound_holds_is_one_that_descends(patience, grade):
+    m = small_mpccs.pair(1.0, 0.0)
+    m.h = pyo.Var(bounds=(0, None), initialize=0.5)
+    m.f = pyo.Objective(expr=(m.x - 1) ** 2 + (m.h - 0.2) ** 2)
+    homotopy_hints(m).guide_bounds[m.h] = (0.5, 2)
+    p = parts(m)
+    p.compiled.narrow()
+    lpec = Lpec(p.compiled, sort_sides(p.compiled), {})
+    certificate = certify_point(p.compiled, lpec, p.compiled.x0, p.subsolves.tolerances, patience=patience)
+    assert certificate.grade is grade and not certificate.certified
