@@ -14,8 +14,9 @@ from pyomo_fesd.mpcc.subproblems.linear_program import ATTEMPTS, Answer, highs_o
 
 #: Iterations of the simplex method before the next attempt, for each row and column: without a basis, and from the last one.
 FIRST, AGAIN = 1.0, 0.1
-#: Settings of the simplex method, each for as long as it ends: on degenerate programs, equilibrated already, either may not.
+#: Settings of the simplex method, each for as long as it ends: on degenerate programs, equilibrated already, any of them may not.
 WAYS = (
+    {'simplex_scale_strategy': 2, 'dual_simplex_cost_perturbation_multiplier': 1.0},
     {'simplex_scale_strategy': 0, 'dual_simplex_cost_perturbation_multiplier': 1.0},
     {'simplex_scale_strategy': 2, 'dual_simplex_cost_perturbation_multiplier': 0.0},
 )
