@@ -284,7 +284,7 @@ class Branches:
     def _step_down(self, point, enough):
         """In the branch of the direction: from its end, within ever smaller trust regions, or onward from the point."""
         step, w = point.certificate.lpec, point.w
-        better = self._point(w + step.d, step.zero, None, False, below=point.f)
+        better = self._point(w + step.d, step.zero, None, False)
         radius = self._tolerances.radius
         sets = self._subsolves.sets(w, self._tolerances.biactive)
         for _ in range(SHRINKS):
@@ -314,7 +314,7 @@ class Branches:
         step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal, limits=limits, **shown)
         if not step.solved or step.descent <= clear:
             return None
-        better = self._point(point.w + step.d, step.zero, None, False, below=point.f)
+        better = self._point(point.w + step.d, step.zero, None, False)
         return better if is_below(better, enough) else None
 
     def _point(self, w, zero, duals, final, **more):
