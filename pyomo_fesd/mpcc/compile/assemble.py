@@ -105,12 +105,18 @@ class _Assembly:
         columns = {id(v): j for j, v in enumerate(self._variables)}
         alike = [[columns[id(v)] for v in group if id(v) in columns] for group in self._problem.hints.alike]
         alike = [group for group in alike if group]
-        slopes = major_index(J), J.indices, J.data
+        slopes = major_index(J), J.indices, np.where(self._in_weights(J), 0.0, J.data)
         s_x = variable_factors(slopes, (certain, constants), self._start, stated_bounds(self._variables), user.x, alike)
         points = (self._start, beside(self._start))
         jacobians = (self._jacobian(self._rows.rows, w) for w in points)
         largest = [largest_entries(with_entries(J, J.data / s_x[J.indices])) for J in jacobians]
         return replace(user, x=s_x, g=row_factors(largest, user.g))
+
+    def _in_weights(self, J):
+        """Which entries of ``J`` (csr) are weights of drifts: at a solution they are 0 but for what keeps the row regular."""
+        weighted = {id(drift.row) for drift in self._problem.hints.drifts}
+        rows = [i for i, c in enumerate(self._constraints) if id(c) in weighted]
+        return np.isin(major_index(J), rows)
 
     def _linearised(self, w):
         """Jacobian of rows and sides, and the sizes of their distances from bounds where the variables are 0.
