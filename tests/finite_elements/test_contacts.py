@@ -182,6 +182,16 @@ def test_a_mass_at_rest_on_a_disc_is_no_minimum_where_a_force_can_take_it_away(n
     assert pyomo_fesd.certify(m).grade.name == 'B'
 
 
+@pytest.mark.parametrize('nfe, ncp', [(5, 2), (3, 2)])
+def test_a_solved_contact_is_judged_alike_afterwards(nfe, ncp):
+    # 5, 2: at a solution a drift has a slope of 1e-28 in its weighted equation, which shows no size;
+    # 3, 2: an element only touches the disc, so that nothing asks for equal lengths, and with free ones the objective descends
+    m = move(contacts.resting(), nfe, ncp)
+    m.away.sense = pyo.maximize
+    results = pyo.SolverFactory('mpec_hybrid').solve(m)
+    assert pyomo_fesd.certify(m).certified == (results.solver.stationarity == 'B')
+
+
 @pytest.mark.parametrize('nfe', [2, 5])
 def test_a_force_takes_it_away_as_far_as_it_can(nfe):
     m = move(contacts.resting(), nfe, 2)

@@ -75,11 +75,12 @@ class BranchSolutions:
         return self._point(found, below, enough)
 
     def onward(self, point, zero, enough):
-        """The certified solution of a branch from ``point``, with the same decisions; None without one of at most ``enough``.
+        """The certified solution of a branch from ``point``, with its decisions; None without one of at most ``enough``.
 
         A direction of the LPEC at the point is one with these decisions.
         """
-        solved, equal = self._with_all(self._subsolves.branch(point.w, zero, point.equal, 0.0), zero, point.equal)
+        equal = self._subsolves.in_force(point.w, point.equal)
+        solved, equal = self._with_all(self._subsolves.branch(point.w, zero, equal, 0.0), zero, equal)
         return None if solved is None else self._point(self._measured(_Solution(nlp=solved, equal=equal)), np.inf, enough)
 
     def _with_all(self, solved, zero, equal, left=ASKED, **more):

@@ -98,10 +98,18 @@ class Subsolves:
     def lpec(self, w, sets, Delta, equal=None, **more):
         """Solve an LPEC for a direction to a better branch."""
         with self._timed('lpec') as started:
-            result = self._lpec.solve(w, sets, Delta, equal, **more)
+            result = self._lpec.solve(w, sets, Delta, self.in_force(w, equal), **more)
         self._count(result)
         self._log('lpec', 0.0, w, 0, f'{result.value:.1e}' if result.solved else 'unsolved', started)
         return result
+
+    def in_force(self, w, equal):
+        """The decisions ``equal`` of a branch NLP that eta still asks for at ``w``.
+
+        Where eta has become 0, as beside an element that only touches a switch, both sides of the pair (13) are zero there: what
+        is shown with the decision says nothing of the points without it.
+        """
+        return None if equal is None else equal & (self._c.evaluate(w).eta > self.tolerances.eta)
 
     def insertion(self, point, sets, order, unchanged):
         """The ``Verdict`` of parts that are inserted into a point in a row; ``unchanged`` are such that change nothing there."""
@@ -112,7 +120,7 @@ class Subsolves:
         return self._verdict(point, lambda equal: self._end_insertions.verdict(point.w, sets, equal, order))
 
     def _verdict(self, point, judge):
-        equal = self._c.evaluate(point.w).eta > self.tolerances.eta if point.equal is None else point.equal
+        equal = self._c.evaluate(point.w).eta > self.tolerances.eta if point.equal is None else self.in_force(point.w, point.equal)
         with self._timed('lpec') as started:
             verdict = judge(equal)
         self._log('order', 0.0, point.w, 0, verdict.value, started)
@@ -140,7 +148,7 @@ class Subsolves:
         started, seconds = time.perf_counter(), self.patience()['time_limit']
         lpec = self._lpec.at_most(None if nlp.is_exact or at_last else seconds)
         with phase(self._setup.timer, 'lpec'):
-            certificate = certify_point(self._c, lpec, nlp.w, self.tolerances, equal, -nlp.lam_g, seconds)
+            certificate = certify_point(self._c, lpec, nlp.w, self.tolerances, self.in_force(nlp.w, equal), -nlp.lam_g, seconds)
         if certificate.lpec is not None:
             self._count(certificate.lpec)
         self._log('certificate', 0.0, nlp.w, 0, certificate.grade.name, started)

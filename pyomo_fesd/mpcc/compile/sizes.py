@@ -7,8 +7,8 @@ them.  The size of a variable is, in this order,
 * its largest start value, or that of the variables ``alike`` (the same quantity at other places), unless that is small: what is
   zero at a solution starts at any small number in the next solve;
 * by its rows: s_j = max_i max(b_i, max_k |J_ik| s_k)/|J_ij| over the rows i with terms of known size; first by those rows
-  in which no other variable is without a size.  Not by the weighted rows of drifts (theory, 22): their slopes are shares of a whole,
-  the smaller of them 1e-28 at a solution.
+  in which no other variable is without a size.  Not by the weighted rows of drifts (theory, 22), whose slopes are shares of 1:
+  the smaller ones are 1e-28 at a solution.
 
 Variables of a mild size keep the factor 1, and so do rows whose largest gradient entry is mild; others get the inverse, as a power
 of 2, which no rounding follows.
