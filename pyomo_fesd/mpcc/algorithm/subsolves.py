@@ -106,8 +106,8 @@ class Subsolves:
     def in_force(self, w, equal):
         """The decisions ``equal`` of a branch NLP that eta still asks for at ``w``.
 
-        Where eta has become 0, as beside an element that only touches a switch, both sides of the pair (13) are zero there: what
-        is shown with the decision says nothing of the points without it.
+        Where eta has become 0, both sides of the pair (13) are zero there: what is shown with the decision says nothing of the
+        points without it.
         """
         return None if equal is None else equal & (self._c.evaluate(w).eta > self.tolerances.eta)
 
