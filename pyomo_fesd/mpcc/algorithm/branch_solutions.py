@@ -75,9 +75,9 @@ class BranchSolutions:
         return self._point(found, below, enough)
 
     def onward(self, point, zero, enough):
-        """The certified solution of a branch from ``point``, with its decisions; None without one of at most ``enough``.
+        """The certified solution of a branch from ``point``; None without one of at most ``enough``.
 
-        A direction of the LPEC at the point is one with these decisions.
+        It has the decisions in force at the point, with which the LPEC found its direction.
         """
         equal = self._subsolves.in_force(point.w, point.equal)
         solved, equal = self._with_all(self._subsolves.branch(point.w, zero, equal, 0.0), zero, equal)

@@ -104,7 +104,7 @@ class Subsolves:
         return result
 
     def in_force(self, w, equal):
-        """The decisions ``equal`` of a branch NLP that eta still asks for at ``w``.
+        """The decisions ``equal`` of a branch NLP that eta still asks for at ``w``; None stays None.
 
         Where eta has become 0, both sides of the pair (13) are zero there: what is shown with the decision says nothing of the
         points without it.
