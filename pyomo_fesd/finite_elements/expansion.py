@@ -43,6 +43,7 @@ from pyomo_fesd.core import (
 )
 from pyomo_fesd.finite_elements.collocation import Collocation
 from pyomo_fesd.finite_elements.given_inputs import complete_params, fix_at_new_times, read_fixed_inputs
+from pyomo_fesd.finite_elements.objectives import objectives_as_stated
 
 #: Types over time that pyomo.dae expands itself, or correctly ignores.
 NATIVE = (Var, Constraint, Expression, Block, DerivativeVar, Param, Suffix, Integral, Piecewise, ContinuousSet)
@@ -80,7 +81,7 @@ def discretise(block: Block, wrt: ContinuousSet, shares: list[int], ncp: int, sc
         decimals = label_decimals(wrt, shares, ncp)
         place_boundaries(wrt, shares, decimals)
         try:
-            with hybrid_expansion(block, wrt):
+            with objectives_as_stated(block), hybrid_expansion(block, wrt):
                 Collocation(decimals).apply_to(block, wrt=wrt, nfe=sum(shares), ncp=ncp, scheme=scheme)
             call_rules_again(block, wrt)
         except (KeyError, ValueError) as error:

@@ -3,7 +3,7 @@
 import time
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -35,6 +35,9 @@ INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
 #: Status where Ipopt cannot make the violation smaller, and the violation from which on its point is none: a multiplier may be so
 #: large that the objective owes all to what is left, as with a force of 1e7 at a gap of 1e-8.
 STUCK, LEFT = 'Restoration_Failed', 1e-8
+#: Ipopt scales rows and an objective down whose gradients at the start of an NLP have larger entries than this; and rows where
+#: parts have extents.
+STEEP, STEEPEST_ROW = 1e2, 1e4
 #: Statuses with which a point is of no use, whatever its violation.
 USELESS = (*INFEASIBLE, DIVERGING)
 #: Iterations that an NLP may use; a relaxation without multipliers to start from may use more.
@@ -210,8 +213,21 @@ class Subsolves:
     def _make(self, kind, name, x, p, f, g, budget=None, derivatives=None):
         """An NLP solver of the user's choice, with the limits of its kind."""
         options = self._options
-        ours = {'max_iter': ITERATIONS[kind](options), 'tol': getattr(options, f'{kind}_tol')} | (budget or {})
+        ours = {'max_iter': ITERATIONS[kind](options), 'tol': getattr(options, f'{kind}_tol')} | self._scaling | (budget or {})
         return self._solver(name, x, p, f, g, ours, self._setup.deadline, derivatives, options.nlp_options.value())
+
+    @cached_property
+    def _scaling(self):
+        """Options with which Ipopt leaves steeper rows as they are where parts have extents, and the objective has its own factor.
+
+        The slope of a row by an extent is a rate.  Rates at the start, by which Ipopt would scale rows down, say little of those
+        elsewhere, and rows that are scaled down count less.  None if the user says how Ipopt scales.
+        """
+        if not self.parts.all or any('scaling' in name for name in self._options.nlp_options.value()):
+            return {}
+        slopes = np.abs(self._c.gradients(self._c.x0)[0])
+        steepest = slopes[np.isfinite(slopes)].max(initial=STEEP)
+        return {'nlp_scaling_max_gradient': STEEPEST_ROW, 'obj_scaling_factor': float(STEEP / min(steepest, STEEPEST_ROW))}
 
     def _nlp(self, kind, eps, solve):
         with self._timed(kind) as started:

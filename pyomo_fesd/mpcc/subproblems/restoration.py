@@ -28,7 +28,9 @@ class Restoration:
         self._up, self._down = np.flatnonzero(np.isfinite(self._lbg)), np.flatnonzero(np.isfinite(self._ubg))
         self._parts = len(self._up) + len(self._down)
         relaxed = with_parts(nlp, self._up, self._down)
-        self._nlp = make('restoration', relaxed.x, relaxed.p, relaxed.f, relaxed.g, None, relaxed.derivatives)
+        # the factor that the model's objective has is none for violations
+        unscaled = {'obj_scaling_factor': 1.0}
+        self._nlp = make('restoration', relaxed.x, relaxed.p, relaxed.f, relaxed.g, unscaled, relaxed.derivatives)
 
     def solve(self, w, eps):
         """Solve from ``w``; ``f`` of the result is the remaining sum of violations."""
