@@ -95,7 +95,7 @@ def expression_key(expressions, kind) -> tuple:
         if detail is not None:
             arguments = node.args
             tokens.append((cls, len(arguments), detail(node)))
-            waiting.extend(arguments[::-1])
+            waiting += arguments[::-1]
             continue
         number = numbers.get(id(node))
         if number is None:

@@ -14,7 +14,7 @@ from weakref import ref
 from pyomo.core import Block, Constraint, Set, Var
 from pyomo.core.base.block import BlockData
 
-from pyomo_fesd.core import GENERATED, exchanged, index_tuple, switched_systems
+from pyomo_fesd.core import GENERATED, exchanged, index_tuple, insert, switched_systems
 from pyomo_fesd.dcs.continuation import Continuation
 from pyomo_fesd.dcs.forms import heaviside
 from pyomo_fesd.dcs.reading import split
@@ -109,7 +109,7 @@ def _impose_only_mode(block, index, system):
     """One mode left: its equations and its region hold as they are."""
     (mode,) = system.modes
     for j, con in enumerate(mode.constraints(), start=1):
-        _record_sources(block, block.mode.add((*index, j), con.expr), system, [con])
+        _record_sources(block, insert(block.mode, (*index, j), con.expr), system, [con])
 
 
 def _add_blended_equations(block, index, system, weight, continuation):
@@ -123,7 +123,7 @@ def _add_blended_equations(block, index, system, weight, continuation):
             terms = _terms(system, j, rhs, continuation)
             expr = sum(weight(modes) * f for modes, f in terms if not _is_zero(f))
         sources = list(chain(*(used[j] for used in equations.used)))
-        _record_sources(block, block.mode.add((*index, j + 1), v == expr), system, sources)
+        _record_sources(block, insert(block.mode, (*index, j + 1), v == expr), system, sources)
 
 
 def _terms(system, j, rhs, continuation):

@@ -14,7 +14,7 @@ from pyomo.core import Constraint, ConstraintList, RangeSet, Set, quicksum
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import Follower, MovingGrid, all_switched_systems, homotopy_hints, is_generated, leaves_of
+from pyomo_fesd.core import Follower, MovingGrid, all_switched_systems, homotopy_hints, insert, is_generated, leaves_of
 from pyomo_fesd.finite_elements.mixed_complementarity import repeats_other_side
 from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
 
@@ -33,7 +33,7 @@ def add_cross_complementarity(moving: MovingGrid, conditions: list[TimeComplemen
     for condition in conditions:
         for element in grid.elements:
             for index, (G, H) in _pairs(condition, element, form):
-                pair = block.cross.add((condition.name, element.n, *index), complements(G >= 0, H >= 0))
+                pair = insert(block.cross, (condition.name, element.n, *index), complements(G >= 0, H >= 0))
                 moving.sources[pair] = [moving.source(condition.conditions[t]) for t in condition.points(element)]
     _lead_first_time(moving, form)
     _add_signs(moving)

@@ -60,8 +60,9 @@ class PiecewiseRewriter:
 
     def _contains(self, source):
         """Whether a component contains a piecewise function."""
-        sides = _complementarity_sides(source) if source.ctype is Complementarity else (source.expr,)
-        return any(contains_node(side, NODES, self._enters) for side in sides)
+        if source.ctype is not Complementarity:
+            return contains_node(source.expr, NODES, self._enters)
+        return any(contains_node(side, NODES, self._enters) for side in _complementarity_sides(source))
 
     def _enters(self, named):
         return not self.waits(named)
