@@ -186,10 +186,10 @@ def _record_sources(block, replacement, system, sources):
 
 def _record_multipliers(block, system, weight):
     """nu of every disjunct: the sum over the modes that it is part of."""
-    for disjunct in system.tree.disjuncts():
-        modes = [i for i, mode in enumerate(system.modes) if disjunct in mode]
+    multipliers = switched_systems(block).multipliers
+    for disjunct, modes in system.parts():
         if modes:
-            switched_systems(block).multipliers[disjunct] = weight(modes)
+            multipliers[disjunct] = weight(modes)
 
 
 def _record_sources_of_form(block, index, system, form):
@@ -206,10 +206,11 @@ def _deactivate(block, system):
     """Deactivate the sources, which keep their contents as after Pyomo's own GDP transformations."""
     for disjunction in (system.disjunction, *system.tree.nested):
         disjunction.deactivate()
-    for disjunct in system.tree.disjuncts():
-        if any(disjunct in mode for mode in system.modes):
+    treated = ref(block)
+    for disjunct, modes in system.parts():
+        if modes:
             disjunct._deactivate_without_fixing_indicator()
-            disjunct._transformation_block = ref(block)
+            disjunct._transformation_block = treated
         elif disjunct.active:
             if any(disjunct in mode for mode in system.tree.modes):
                 switched_systems(block).excluded.add(disjunct)

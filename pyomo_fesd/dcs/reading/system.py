@@ -43,6 +43,14 @@ class ModeSystem:
         """The outermost DisjunctionData."""
         return self.tree.disjunction
 
+    def parts(self) -> list[tuple]:
+        """Return every disjunct with the numbers of the modes that it is part of; none for one that is switched off."""
+        numbers = {}
+        for i, mode in enumerate(self.modes):
+            for disjunct in mode.disjuncts:
+                numbers.setdefault(id(disjunct), []).append(i)
+        return [(disjunct, numbers.get(id(disjunct), [])) for disjunct in self.tree.disjuncts()]
+
 
 @dataclass(frozen=True)
 class HysteresisSystem(ModeSystem):
