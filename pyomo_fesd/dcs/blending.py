@@ -57,7 +57,8 @@ def blend(system, form, defined) -> Callable:
         _add_blended_equations(block, index, system, weight, Continuation(block, _index_sets(system), index, system, form))
         _record_multipliers(block, system, weight)
         _record_sources_of_form(block, index, system, form)
-        defined.update((v, system.disjunction) for v in system.equations.defined)
+        for v in system.equations.defined:
+            defined[v] = system.disjunction
     _deactivate(block, system)
     return weight
 
@@ -115,22 +116,22 @@ def _impose_only_mode(block, index, system):
 def _add_blended_equations(block, index, system, weight, continuation):
     """v = sum_i nu_i f_i (eq. 7); v = f where all modes agree; copies of v where a mode is implicit."""
     equations = system.equations
-    rhs = [_implicit_mode(block, index, system, i, continuation) if None in f else f for i, f in enumerate(equations.rhs)]
+    implicit = [equations.is_implicit(i) for i in range(len(system.modes))]
+    rhs = [_implicit_mode(block, index, system, i, continuation) if implicit[i] else f for i, f in enumerate(equations.rhs)]
     for j, v in enumerate(equations.defined):
         if len(equations.alike[j]) == 1:
             expr = rhs[0][j]
         else:
-            terms = _terms(system, j, rhs, continuation)
+            terms = _terms(system, j, rhs, implicit, continuation)
             expr = sum(weight(modes) * f for modes, f in terms if not _is_zero(f))
         sources = list(chain(*(used[j] for used in equations.used)))
         _record_sources(block, insert(block.mode, (*index, j + 1), v == expr), system, sources)
 
 
-def _terms(system, j, rhs, continuation):
+def _terms(system, j, rhs, implicit, continuation):
     """Yield modes by number with the right-hand side that they share; each alone where it is continued outside of its region."""
     for modes in system.equations.alike[j]:
-        explicit = [i for i in modes if None not in system.equations.rhs[i]]
-        apart = [i for i in explicit if any(system.laws[i][j].domains)]
+        apart = [i for i in modes if not implicit[i] and any(system.laws[i][j].domains)]
         for i in apart:
             yield [i], continuation.law(i, rhs[i][j], system.laws[i][j].domains)
         if len(apart) < len(modes):

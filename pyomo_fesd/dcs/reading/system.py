@@ -108,8 +108,8 @@ class SystemReader:
             lambda v: (*self._variables.kind(v), v.lb, v.ub),
         )
         self._refuse_foreign(tree, modes, [*equalities, *inequalities], parts)
-        if (counts, key) in self._read:
-            first, stamp = self._read[counts, key]
+        first, stamp = self._read.get((counts, key), (None, None))
+        if first is not None:
             regions = Regions([stamp.expression(c, parts) for c in first.regions.functions], first.regions.geometry)
             return ModeSystem(tree, modes, regions, first.equations.stamped(stamp, parts, equalities), first.laws)
         system = self._study(tree, modes, equalities, inequalities)
