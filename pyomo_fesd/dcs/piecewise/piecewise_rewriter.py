@@ -21,6 +21,7 @@ from pyomo.core.expr.visitor import ExpressionReplacementVisitor
 from pyomo.dae import Integral
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
+from pyomo.mpec.complementarity import ComplementarityData
 
 from pyomo_fesd.core import (
     DISCRETISATION,
@@ -59,7 +60,7 @@ class PiecewiseRewriter:
 
     def _contains(self, source):
         """Whether a component contains a piecewise function."""
-        if source.ctype is not Complementarity:
+        if not isinstance(source, ComplementarityData):
             return contains_node(source.expr, NODES, self._enters)
         return any(contains_node(side, NODES, self._enters) for side in _complementarity_sides(source))
 
