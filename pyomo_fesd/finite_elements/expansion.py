@@ -194,7 +194,8 @@ def _make_missing(disjunct):
     """Make the missing data of a Disjunct by its rule."""
     for index in disjunct.index_set():
         if index not in disjunct:
-            disjunct[index]
+            # what ``disjunct[index]`` calls when it has searched the index set
+            disjunct._getitem_when_not_present(index)
 
 
 def _hybrid_over_time(block, wrt):
