@@ -185,6 +185,10 @@ class TimeIndex:
                     if time is not None:
                         groups[name][time] = data
                 continue
+            if component.index_set() is self.wrt:
+                by_time = dict(entries_of(component))
+                groups[self.split(next(iter(by_time.values())))[1]].update(by_time)
+                continue
             by_rest = {}
             for index, data in entries_of(component):
                 index = index_tuple(index)
