@@ -41,7 +41,7 @@ def blend(system, form, defined) -> Callable:
     callable
         the sum of the multipliers of some modes, given by their numbers
     """
-    block, index = _form_block(system, form), index_tuple(system.disjunction.index())
+    block, index, parts = _form_block(system, form), index_tuple(system.disjunction.index()), system.parts()
 
     @cache
     def weight_of(modes):
@@ -55,11 +55,11 @@ def blend(system, form, defined) -> Callable:
     else:
         form.add(block, index, system)
         _add_blended_equations(block, index, system, weight, Continuation(block, _index_sets(system), index, system, form))
-        _record_multipliers(block, system, weight)
+        _record_multipliers(block, parts, weight)
         _record_sources_of_form(block, index, system, form)
         for v in system.equations.defined:
             defined[v] = system.disjunction
-    _deactivate(block, system)
+    _deactivate(block, system, parts)
     return weight
 
 
@@ -110,12 +110,12 @@ def _impose_only_mode(block, index, system):
     """One mode left: its equations and its region hold as they are."""
     (mode,) = system.modes
     for j, con in enumerate(mode.constraints(), start=1):
-        _record_sources(block, insert(block.mode, (*index, j), con.expr), system, [con])
+        _record_sources(source_maps(block), insert(block.mode, (*index, j), con.expr), system, [con])
 
 
 def _add_blended_equations(block, index, system, weight, continuation):
     """v = sum_i nu_i f_i (eq. 7); v = f where all modes agree; copies of v where a mode is implicit."""
-    equations = system.equations
+    equations, maps = system.equations, source_maps(block)
     implicit = [equations.is_implicit(i) for i in range(len(system.modes))]
     rhs = [_implicit_mode(block, index, system, i, continuation) if implicit[i] else f for i, f in enumerate(equations.rhs)]
     for j, v in enumerate(equations.defined):
@@ -125,7 +125,7 @@ def _add_blended_equations(block, index, system, weight, continuation):
             terms = _terms(system, j, rhs, implicit, continuation)
             expr = sum(weight(modes) * f for modes, f in terms if not _is_zero(f))
         sources = list(chain(*(used[j] for used in equations.used)))
-        _record_sources(block, insert(block.mode, (*index, j + 1), v == expr), system, sources)
+        _record_sources(maps, insert(block.mode, (*index, j + 1), v == expr), system, sources)
 
 
 def _terms(system, j, rhs, implicit, continuation):
@@ -160,7 +160,7 @@ def _implicit_mode(block, index, system, i, continuation):
     swap = {id(v): copy for v, copy in zip(equations.defined, own)}
     for j, (con, law) in enumerate(zip(equations.equations[i], system.laws[i]), start=1):
         body = _continued_body(con.body - con.upper, equations.defined, swap, law, i, continuation)
-        _record_sources(block, block.own_equation.add((*index, i + 1, j), body == 0), system, [con])
+        _record_sources(source_maps(block), block.own_equation.add((*index, i + 1, j), body == 0), system, [con])
     return own
 
 
@@ -179,16 +179,15 @@ def _continued_body(body, defined, swap, law, i, continuation):
     return continuation.law(i, exchanged(own, swap), law.domains) + continuation.side(i, rest, law.rest)
 
 
-def _record_sources(block, replacement, system, sources):
-    maps = source_maps(block)
+def _record_sources(maps, replacement, system, sources):
     maps.disjunction[replacement] = system.disjunction
     maps.connect(replacement, sources)
 
 
-def _record_multipliers(block, system, weight):
+def _record_multipliers(block, parts, weight):
     """nu of every disjunct: the sum over the modes that it is part of."""
     multipliers = switched_systems(block).multipliers
-    for disjunct, modes in system.parts():
+    for disjunct, modes in parts:
         if modes:
             multipliers[disjunct] = weight(modes)
 
@@ -203,12 +202,12 @@ def _record_sources_of_form(block, index, system, form):
             (maps.disjunct[pair],) = system.modes[mode].innermost
 
 
-def _deactivate(block, system):
+def _deactivate(block, system, parts):
     """Deactivate the sources, which keep their contents as after Pyomo's own GDP transformations."""
     for disjunction in (system.disjunction, *system.tree.nested):
         disjunction.deactivate()
     treated = ref(block)
-    for disjunct, modes in system.parts():
+    for disjunct, modes in parts:
         if modes:
             disjunct._deactivate_without_fixing_indicator()
             disjunct._transformation_block = treated
