@@ -7,7 +7,6 @@ Leaves: a block beside the Disjunction, of its name, with the components of the 
 """
 
 from collections.abc import Callable
-from functools import cache
 from itertools import chain
 from weakref import ref
 
@@ -43,12 +42,14 @@ def blend(system, form, defined) -> Callable:
     """
     block, index, parts = _form_block(system, form), index_tuple(system.disjunction.index()), system.parts()
 
-    @cache
-    def weight_of(modes):
-        return 1.0 if len(modes) == len(system.modes) else form.weight(block, index, system, modes)
+    # for a single Disjunction at one time, functools.cache takes longer to set up than it saves
+    weights = {}
 
     def weight(modes):
-        return weight_of(tuple(modes))
+        modes = tuple(modes)
+        if modes not in weights:
+            weights[modes] = 1.0 if len(modes) == len(system.modes) else form.weight(block, index, system, modes)
+        return weights[modes]
 
     if form is None:
         _impose_only_mode(block, index, system)

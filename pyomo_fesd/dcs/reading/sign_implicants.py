@@ -44,8 +44,9 @@ class SignImplicants:
         return self._found[modes]
 
     def weighing(self, modes, number):
-        """Return rows whose weights add up to that of some ``modes`` out of a ``number``: the other side of one function if it is."""
+        """Return rows whose weights add up to that of some ``modes`` out of a ``number``."""
         if (modes, number) not in self._found:
+            # the other side of one function is shorter
             others = self.covering(frozenset(range(number)) - modes)
             opposite = len(others) == 1 and sum(map(abs, others[0])) == 1
             rows = [tuple(-sign for sign in others[0])] if opposite else self.covering(modes)
