@@ -85,7 +85,7 @@ def discretise(block: Block, wrt: ContinuousSet, shares: list[int], ncp: int, sc
         try:
             with hybrid_expansion(block, wrt):
                 Collocation(decimals).apply_to(block, wrt=wrt, nfe=sum(shares), ncp=ncp, scheme=scheme)
-                # inside: data of Disjuncts that are made behind are complete, or their rules raise
+                # here, since Disjuncts that are made afterwards are complete, or their rules raise
                 call_rules_again(block, wrt)
         except (KeyError, ValueError) as error:
             complete_params(block, wrt, controls, error)
