@@ -7,9 +7,9 @@ the solver; no time in it).
 ``private_data`` keeps them on blocks, ``generated`` recognises generated blocks, ``keywords`` refuses values outside of their
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
-``evaluation``, ``gradient``, ``gradients``, ``interpolation``, ``positive_part``, ``step``, ``smallest``, ``units_of_measure``,
-``expression_key``, ``stamp``, ``structural_key``, ``node_search``, ``own_data`` and ``phase`` are tools. This room imports from no
-other.
+``evaluation``, ``gradient``, ``gradients``, ``insertion``, ``interpolation``, ``positive_part``, ``step``, ``smallest``,
+``units_of_measure``, ``expression_key``, ``stamp``, ``structural_key``, ``node_search``, ``own_data`` and ``phase`` are tools.
+This room imports from no other.
 """
 
 from pyomo_fesd.core.boundary_laws import Hysteresis, Impacts, StateJumps
@@ -55,13 +55,14 @@ from pyomo_fesd.core.homotopy_hints import (
     all_hints,
     homotopy_hints,
 )
+from pyomo_fesd.core.insertion import insert
 from pyomo_fesd.core.instants import Instant
 from pyomo_fesd.core.interpolation import interpolation_weights
 from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible
 from pyomo_fesd.core.keywords import check_keywords, read_keywords
 from pyomo_fesd.core.moving_grid import MovingGrid, Split, add_moving_grid, moving_grids
 from pyomo_fesd.core.node_search import contains_node, leaves_of
-from pyomo_fesd.core.own_data import components_reader, data_of, own_components, own_data, variables_below
+from pyomo_fesd.core.own_data import data_of, declared, own_blocks, own_components, own_data, variables_below
 from pyomo_fesd.core.parts import Part
 from pyomo_fesd.core.phase import phase
 from pyomo_fesd.core.positive_part import add_part_of_number, add_positive_part, declare_positive_part

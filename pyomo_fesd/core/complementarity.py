@@ -132,6 +132,9 @@ def read_complementarity(data) -> Pair | Mixed:
         a bare variable, its declared bounds).
     """
     args = _arguments(data)
+    if all(map(_is_lower_bound_zero, args)):
+        # most conditions are generated, and there is one at every time: the rest takes longer than to read them
+        return Pair(*(arg.args[1] for arg in args))
     sides = [read_side(arg) for arg in args]
     stated = [isinstance(arg, (InequalityExpression, RangedExpression)) for arg in args]
     for i, j in ((0, 1), (1, 0)):
@@ -151,6 +154,11 @@ def read_complementarity(data) -> Pair | Mixed:
         if bounds < 2
         else "state the two that are meant: complements(G >= 0, H >= 0), or complements(inequality(l, x, u), F)",
     )
+
+
+def _is_lower_bound_zero(arg):
+    """Whether an argument reads ``0 <= body``, of a number that cannot change."""
+    return arg.__class__ is InequalityExpression and arg.args[0].__class__ in native_numeric_types and arg.args[0] == 0
 
 
 def _arguments(data):

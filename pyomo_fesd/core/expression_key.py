@@ -94,8 +94,8 @@ def expression_key(expressions, kind) -> tuple:
         detail = detail_of(cls)
         if detail is not None:
             arguments = node.args
-            tokens.append((cls, len(arguments), detail(node)))
-            waiting.extend(arguments[::-1])
+            tokens += cls, len(arguments), detail(node)
+            waiting += arguments[::-1]
             continue
         number = numbers.get(id(node))
         if number is None:

@@ -24,13 +24,15 @@ def contains_node(expr, sought: frozenset, enter=None) -> bool:
     enter : function ExpressionData -> bool, optional
         whether to search in this named Expression.  Default: a named Expression counts as found.
     """
-    waiting = [expr]
+    sorts, waiting = _sorts(sought), [expr]
     while waiting:
         node = waiting.pop()
-        sort = _sort(node.__class__, sought)
+        sort = sorts[node.__class__]
+        if sort is _LEAF:
+            continue
         if sort is _SOUGHT or (sort is _NAMED and enter is None):
             return True
-        if sort is _OPERATION or (sort is _NAMED and enter(node)):
+        if sort is _OPERATION or enter(node):
             waiting.extend(node.args)
     return False
 
@@ -48,11 +50,16 @@ def leaves_of(expr) -> Iterator:
             yield node
 
 
-@cache
-def _sort(cls, sought):
-    """How a class of nodes is searched: this is asked for every node of every constraint."""
-    if cls in sought:
-        return _SOUGHT
-    if issubclass(cls, NamedExpressionData):
-        return _NAMED
-    return _OPERATION if issubclass(cls, ExpressionBase) else _LEAF
+class _Sorts(dict):
+    """How each class of nodes is searched: this is looked up for every node of every constraint."""
+
+    def __init__(self, sought):
+        super().__init__(dict.fromkeys(sought, _SOUGHT))
+
+    def __missing__(self, cls):
+        sort = _NAMED if issubclass(cls, NamedExpressionData) else _OPERATION if issubclass(cls, ExpressionBase) else _LEAF
+        self[cls] = sort
+        return sort
+
+
+_sorts = cache(_Sorts)

@@ -18,6 +18,7 @@ from pyomo.core.base.var import VarData
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core.evaluation import value_or_zero
+from pyomo_fesd.core.insertion import insert
 from pyomo_fesd.core.switched_systems import Dependents, Step, switched_systems
 from pyomo_fesd.core.time_index import stored_index
 from pyomo_fesd.core.units_of_measure import without_unit
@@ -47,15 +48,17 @@ def add_step(block: BlockData, index: tuple, c, lean: float = 0.0) -> VarData:
     lean : float
         alpha starts at 1/2, changed by ``lean`` towards the side of c at the present values
     """
+    systems = switched_systems(block)
     alpha, p, n = (variable[stored_index(index)] for variable in (block.alpha, block.p, block.n))
     now = float(value_or_zero(c))  # start values may be numpy numbers, whose comparisons cannot be subtracted
-    p.value, n.value, _ = step_values([now])
-    alpha.value = 0.5 + lean * ((now > 0) - (now < 0))
-    block.switching.add(stored_index(index), without_unit(c) == p - n)
-    block.complementarity.add((*index, 1), complements(alpha >= 0, n >= 0))
-    block.complementarity.add((*index, 2), complements(1 - alpha >= 0, p >= 0))
-    switched_systems(block).steps.append(Step(alpha, c))
-    switched_systems(block).dependents.append(Dependents((p, n, alpha), (c,), step_values))
+    starts = max(now, 0.0), max(-now, 0.0), 0.5 + lean * ((now > 0) - (now < 0))
+    for variable, start in zip((p, n, alpha), starts):
+        variable.set_value(start, skip_validation=True)
+    insert(block.switching, index, without_unit(c) == p - n)
+    insert(block.complementarity, (*index, 1), complements(alpha >= 0, n >= 0))
+    insert(block.complementarity, (*index, 2), complements(1 - alpha >= 0, p >= 0))
+    systems.steps.append(Step(alpha, c))
+    systems.dependents.append(Dependents((p, n, alpha), (c,), step_values))
     return alpha
 
 

@@ -47,7 +47,7 @@ def is_discretisation_equation(constraint) -> bool:
 
 def is_indexed_by(component, wrt) -> bool:
     """Whether ``wrt`` is one of the index sets of ``component`` itself."""
-    return any(s is wrt for s in index_sets(component))
+    return component.is_indexed() and any(s is wrt for s in index_sets(component))
 
 
 def time_position(component, wrt) -> int | None:
@@ -128,6 +128,14 @@ class TimeIndex:
             full = self._names[id(component), index] = f'{name}[{",".join(map(str, index))}]'
         return time, full
 
+    def _split_scalar(self, component):
+        """``split`` of a scalar component, of which nothing is kept: there are many, and each is read once."""
+        block = component.parent_block()
+        if block is None or block.parent_block() is None:
+            return None, component.local_name
+        time, prefix = self.split(block)
+        return time, f'{prefix}.{component.local_name}'
+
     def time(self, data):
         """Time label of ``data``, or None; of a whole indexed component, as a Suffix may hold, that of the block it is on."""
         component = data.parent_component()
@@ -165,12 +173,21 @@ class TimeIndex:
         groups = defaultdict(dict)
         # an index set without members has no dimension, and so no place for the time
         for component in filter(len, components):
+            if not component.is_indexed():
+                time, name = self._split_scalar(component)
+                if time is not None:
+                    groups[name][time] = component
+                continue
             _, outer, _, _, position = self._place(component)
             if position is None or outer is not None:
                 for data in data_of(component):
                     time, name = self.split(data)
                     if time is not None:
                         groups[name][time] = data
+                continue
+            if component.index_set() is self.wrt:
+                by_time = dict(entries_of(component))
+                groups[self.split(next(iter(by_time.values())))[1]].update(by_time)
                 continue
             by_rest = {}
             for index, data in entries_of(component):

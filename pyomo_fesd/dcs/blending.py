@@ -7,14 +7,13 @@ Leaves: a block beside the Disjunction, of its name, with the components of the 
 """
 
 from collections.abc import Callable
-from functools import cache
 from itertools import chain
 from weakref import ref
 
 from pyomo.core import Block, Constraint, Set, Var
 from pyomo.core.base.block import BlockData
 
-from pyomo_fesd.core import GENERATED, exchanged, index_tuple, switched_systems
+from pyomo_fesd.core import GENERATED, exchanged, index_tuple, insert, switched_systems
 from pyomo_fesd.dcs.continuation import Continuation
 from pyomo_fesd.dcs.forms import heaviside
 from pyomo_fesd.dcs.reading import split
@@ -41,24 +40,27 @@ def blend(system, form, defined) -> Callable:
     callable
         the sum of the multipliers of some modes, given by their numbers
     """
-    block, index = _form_block(system, form), index_tuple(system.disjunction.index())
+    block, index, parts = _form_block(system, form), index_tuple(system.disjunction.index()), system.parts()
 
-    @cache
-    def weight_of(modes):
-        return 1.0 if len(modes) == len(system.modes) else form.weight(block, index, system, modes)
+    # for a single Disjunction at one time, functools.cache takes longer to set up than it saves
+    weights = {}
 
     def weight(modes):
-        return weight_of(tuple(modes))
+        modes = tuple(modes)
+        if modes not in weights:
+            weights[modes] = 1.0 if len(modes) == len(system.modes) else form.weight(block, index, system, modes)
+        return weights[modes]
 
     if form is None:
         _impose_only_mode(block, index, system)
     else:
         form.add(block, index, system)
         _add_blended_equations(block, index, system, weight, Continuation(block, _index_sets(system), index, system, form))
-        _record_multipliers(block, system, weight)
+        _record_multipliers(block, parts, weight)
         _record_sources_of_form(block, index, system, form)
-        defined.update((v, system.disjunction) for v in system.equations.defined)
-    _deactivate(block, system)
+        for v in system.equations.defined:
+            defined[v] = system.disjunction
+    _deactivate(block, system, parts)
     return weight
 
 
@@ -109,28 +111,28 @@ def _impose_only_mode(block, index, system):
     """One mode left: its equations and its region hold as they are."""
     (mode,) = system.modes
     for j, con in enumerate(mode.constraints(), start=1):
-        _record_sources(block, block.mode.add((*index, j), con.expr), system, [con])
+        _record_sources(source_maps(block), insert(block.mode, (*index, j), con.expr), system, [con])
 
 
 def _add_blended_equations(block, index, system, weight, continuation):
     """v = sum_i nu_i f_i (eq. 7); v = f where all modes agree; copies of v where a mode is implicit."""
-    equations = system.equations
-    rhs = [_implicit_mode(block, index, system, i, continuation) if None in f else f for i, f in enumerate(equations.rhs)]
+    equations, maps = system.equations, source_maps(block)
+    implicit = [equations.is_implicit(i) for i in range(len(system.modes))]
+    rhs = [_implicit_mode(block, index, system, i, continuation) if implicit[i] else f for i, f in enumerate(equations.rhs)]
     for j, v in enumerate(equations.defined):
         if len(equations.alike[j]) == 1:
             expr = rhs[0][j]
         else:
-            terms = _terms(system, j, rhs, continuation)
+            terms = _terms(system, j, rhs, implicit, continuation)
             expr = sum(weight(modes) * f for modes, f in terms if not _is_zero(f))
         sources = list(chain(*(used[j] for used in equations.used)))
-        _record_sources(block, block.mode.add((*index, j + 1), v == expr), system, sources)
+        _record_sources(maps, insert(block.mode, (*index, j + 1), v == expr), system, sources)
 
 
-def _terms(system, j, rhs, continuation):
+def _terms(system, j, rhs, implicit, continuation):
     """Yield modes by number with the right-hand side that they share; each alone where it is continued outside of its region."""
     for modes in system.equations.alike[j]:
-        explicit = [i for i in modes if None not in system.equations.rhs[i]]
-        apart = [i for i in explicit if any(system.laws[i][j].domains)]
+        apart = [i for i in modes if not implicit[i] and any(system.laws[i][j].domains)]
         for i in apart:
             yield [i], continuation.law(i, rhs[i][j], system.laws[i][j].domains)
         if len(apart) < len(modes):
@@ -159,7 +161,7 @@ def _implicit_mode(block, index, system, i, continuation):
     swap = {id(v): copy for v, copy in zip(equations.defined, own)}
     for j, (con, law) in enumerate(zip(equations.equations[i], system.laws[i]), start=1):
         body = _continued_body(con.body - con.upper, equations.defined, swap, law, i, continuation)
-        _record_sources(block, block.own_equation.add((*index, i + 1, j), body == 0), system, [con])
+        _record_sources(source_maps(block), block.own_equation.add((*index, i + 1, j), body == 0), system, [con])
     return own
 
 
@@ -178,18 +180,17 @@ def _continued_body(body, defined, swap, law, i, continuation):
     return continuation.law(i, exchanged(own, swap), law.domains) + continuation.side(i, rest, law.rest)
 
 
-def _record_sources(block, replacement, system, sources):
-    maps = source_maps(block)
+def _record_sources(maps, replacement, system, sources):
     maps.disjunction[replacement] = system.disjunction
     maps.connect(replacement, sources)
 
 
-def _record_multipliers(block, system, weight):
+def _record_multipliers(block, parts, weight):
     """nu of every disjunct: the sum over the modes that it is part of."""
-    for disjunct in system.tree.disjuncts():
-        modes = [i for i, mode in enumerate(system.modes) if disjunct in mode]
+    multipliers = switched_systems(block).multipliers
+    for disjunct, modes in parts:
         if modes:
-            switched_systems(block).multipliers[disjunct] = weight(modes)
+            multipliers[disjunct] = weight(modes)
 
 
 def _record_sources_of_form(block, index, system, form):
@@ -202,14 +203,15 @@ def _record_sources_of_form(block, index, system, form):
             (maps.disjunct[pair],) = system.modes[mode].innermost
 
 
-def _deactivate(block, system):
+def _deactivate(block, system, parts):
     """Deactivate the sources, which keep their contents as after Pyomo's own GDP transformations."""
     for disjunction in (system.disjunction, *system.tree.nested):
         disjunction.deactivate()
-    for disjunct in system.tree.disjuncts():
-        if any(disjunct in mode for mode in system.modes):
+    treated = ref(block)
+    for disjunct, modes in parts:
+        if modes:
             disjunct._deactivate_without_fixing_indicator()
-            disjunct._transformation_block = ref(block)
+            disjunct._transformation_block = treated
         elif disjunct.active:
             if any(disjunct in mode for mode in system.tree.modes):
                 switched_systems(block).excluded.add(disjunct)

@@ -1,6 +1,6 @@
 """Distinguish differential states and their derivatives from algebraic variables."""
 
-from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.common.collections import ComponentSet
 
 from pyomo_fesd.core import derivatives
 
@@ -19,7 +19,7 @@ class TimeVariables:
     def __init__(self, model, wrt, defined=()):
         self._named = ComponentSet(v for var in defined for v in (var, *(var.values() if var.is_reference() else ())))
         self._derivatives = ComponentSet(derivatives(model, wrt))
-        self._kinds = ComponentMap()
+        self._kinds = {}
         self._states = ComponentSet(d.get_state_var() for d in self._derivatives)
 
     def is_named(self, v) -> bool:
@@ -29,9 +29,10 @@ class TimeVariables:
     def kind(self, v) -> tuple:
         """Whether ``v`` is data of a derivative, and of a state; each component is looked up once."""
         component = v.parent_component()
-        found = self._kinds.get(component)
+        # by id: the model keeps its components
+        found = self._kinds.get(id(component))
         if found is None:
-            found = self._kinds[component] = (self.is_derivative(v), self.is_state(v))
+            found = self._kinds[id(component)] = (self.is_derivative(v), self.is_state(v))
         return found
 
     def is_derivative(self, v) -> bool:

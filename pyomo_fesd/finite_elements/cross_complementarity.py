@@ -14,7 +14,7 @@ from pyomo.core import Constraint, ConstraintList, RangeSet, Set, quicksum
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import Follower, MovingGrid, all_switched_systems, homotopy_hints, is_generated, leaves_of
+from pyomo_fesd.core import Follower, MovingGrid, all_switched_systems, homotopy_hints, insert, is_generated, leaves_of
 from pyomo_fesd.finite_elements.mixed_complementarity import repeats_other_side
 from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
 
@@ -33,7 +33,7 @@ def add_cross_complementarity(moving: MovingGrid, conditions: list[TimeComplemen
     for condition in conditions:
         for element in grid.elements:
             for index, (G, H) in _pairs(condition, element, form):
-                pair = block.cross.add((condition.name, element.n, *index), complements(G >= 0, H >= 0))
+                pair = insert(block.cross, (condition.name, element.n, *index), complements(G >= 0, H >= 0))
                 moving.sources[pair] = [moving.source(condition.conditions[t]) for t in condition.points(element)]
     _lead_first_time(moving, form)
     _add_signs(moving)
@@ -108,15 +108,20 @@ def _add_signs(moving):
 def _never_negative(expr, bounds):
     """Whether the bounds of the variables imply expr >= 0 for all values of mutable Params."""
     if expr.is_variable_type():
-        return not _bound_may_change(expr) and expr.lb is not None and expr.lb >= 0
-    if any(leaf.is_parameter_type() or (leaf.is_variable_type() and _bound_may_change(leaf)) for leaf in leaves_of(expr)):
+        low, high = expr.lower, expr.upper
+        return not _may_change(low) and not _may_change(high) and low is not None and low >= 0
+    if any(leaf.is_parameter_type() or (leaf.is_variable_type() and _bounds_may_change(leaf)) for leaf in leaves_of(expr)):
         return False
     low, _ = bounds.walk_expression(expr)
     return low is not None and low >= 0
 
 
-def _bound_may_change(v):
-    return any(hasattr(bound, 'is_expression_type') for bound in (v.lower, v.upper))
+def _bounds_may_change(v):
+    return _may_change(v.lower) or _may_change(v.upper)
+
+
+def _may_change(bound):
+    return hasattr(bound, 'is_expression_type')
 
 
 def _equate_left_limits(moving):

@@ -3,6 +3,7 @@
 ``dae.collocation`` raises on a Disjunct, Disjunction or Complementarity over time (Pyomo issue #3101) and leaves the model half
 expanded.  Here, while pyomo.dae works, Disjuncts and Complementarities have the type Block (which expands by its rule),
 Disjunctions and LogicalConstraints the type Suffix (which is passed over); these get their new indices by their rule afterwards.
+So do Disjuncts that hold nothing that pyomo.dae would expand, as most do: it would walk over their contents at every time.
 """
 
 from collections.abc import Sequence
@@ -51,6 +52,8 @@ NATIVE = (Var, Constraint, Expression, Block, DerivativeVar, Param, Suffix, Inte
 HYBRID = (Disjunct, Disjunction, Complementarity, LogicalConstraint)
 #: Those of them that get their new indices when pyomo.dae has finished, in this order: logic refers to disjuncts.
 AFTERWARDS = (Disjunction, LogicalConstraint)
+#: Types of components of which pyomo.dae expands nothing where they are scalar.
+SIMPLE = {Constraint, Var, BooleanVar, Expression, Param}
 #: Types over time that cannot be expanded, each with an alternative.
 REFUSED = {
     Objective: "write one Objective, e.g. with a pyomo.dae.Integral",
@@ -83,7 +86,8 @@ def discretise(block: Block, wrt: ContinuousSet, shares: list[int], ncp: int, sc
         try:
             with objectives_as_stated(block), hybrid_expansion(block, wrt):
                 Collocation(decimals).apply_to(block, wrt=wrt, nfe=sum(shares), ncp=ncp, scheme=scheme)
-            call_rules_again(block, wrt)
+                # here, since Disjuncts that are made afterwards are complete, or their rules raise
+                call_rules_again(block, wrt)
         except (KeyError, ValueError) as error:
             complete_params(block, wrt, controls, error)
             raise FesdError(
@@ -147,10 +151,13 @@ def _index_rule(component):
 def hybrid_expansion(block: Block, wrt: ContinuousSet):
     """Within the body, let pyomo.dae's discretisation of ``wrt`` expand hybrid components too."""
     hybrid = [c for c in block.component_objects(HYBRID, descend_into=PLACES) if c.parent_component() is c]
-    off = _switched_off(block, wrt)
-    types = [(c, Suffix if _is_passed_over(c) else Block) for c in hybrid]
+    off, simple = _switched_off(block, wrt), [c for c in hybrid if _is_simple(c, wrt)]
+    types = [(c, Suffix if any(c is s for s in simple) or _is_passed_over(c) else Block) for c in hybrid]
     with DeferredInterrupt() as interrupt, _reclassified(types), withheld_messages('pyomo.dae'), interrupt.raising():
         yield
+    with withheld_messages('pyomo.core'):
+        for disjunct in simple:
+            _make_missing(disjunct)
     for ctype in AFTERWARDS:
         for component in hybrid:
             if component.ctype is ctype and is_indexed_by(component, wrt) and _index_rule(component) is not None:
@@ -175,6 +182,21 @@ def _is_passed_over(component):
     """Whether pyomo.dae passes over a hybrid component, as over Suffixes; it expands the others like Blocks, by their rule."""
     empty = component.is_indexed() and _index_rule(component) is None and not len(component)
     return component.ctype in AFTERWARDS or is_generated(component) or not component.index_set().isfinite() or empty
+
+
+def _is_simple(component, wrt):
+    """Whether a component is a Disjunct over time in which pyomo.dae would expand nothing."""
+    if component.ctype is not Disjunct or not is_indexed_by(component, wrt) or _is_passed_over(component):
+        return False
+    return all(inner.ctype in SIMPLE and not inner.is_indexed() for d in component.values() for inner in d.component_map().values())
+
+
+def _make_missing(disjunct):
+    """Make the missing data of a Disjunct by its rule."""
+    for index in disjunct.index_set():
+        if index not in disjunct:
+            # what ``disjunct[index]`` calls when it has searched the index set
+            disjunct._getitem_when_not_present(index)
 
 
 def _hybrid_over_time(block, wrt):

@@ -18,7 +18,7 @@ from pyomo.core.base.param import IndexedParam
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import FesdError, TimeIndex, derivatives, is_indexed_by, strip_time
+from pyomo_fesd.core import FesdError, TimeIndex, declared, derivatives, is_indexed_by, own_blocks, strip_time
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -30,7 +30,7 @@ REMEDY = (
     "give a time series with pyomo_fesd.signal, or name it in piecewise_constant if it is constant on each control stage; "
     "values that hold at these times only belong into constraints"
 )
-PLACES = (Block, Disjunct)
+PLACES = {Block, Disjunct}
 
 
 def read_fixed_inputs(block: Block, wrt: ContinuousSet, controls: Sequence) -> dict[str, dict]:
@@ -43,7 +43,7 @@ def read_fixed_inputs(block: Block, wrt: ContinuousSet, controls: Sequence) -> d
     """
     states = (d.get_state_var() for d in derivatives(block, wrt))
     known = ComponentSet([*states, *(v for u in controls for v in (u, *u.values()))])
-    variables = block.component_data_objects(Var, descend_into=PLACES)
+    variables = block.component_data_objects(Var, descend_into=(Block, Disjunct))
     others = TimeIndex(wrt).families(v for v in variables if v not in known and v.parent_component() not in known)
     found = {
         strip_time(name): by_time for name, by_time in others.items() if len(by_time) > 1 and all(v.fixed for v in by_time.values())
@@ -100,7 +100,7 @@ def complete_params(block: Block, wrt: ContinuousSet, controls: Sequence, error:
         naming a Param that has other values, or that cannot change
     """
     given = ComponentSet(controls)
-    for param in block.model().component_objects(Param, descend_into=PLACES):
+    for param in (p for place in own_blocks(block.model(), PLACES) for p in declared(place, {Param})):
         if isinstance(param, IndexedParam) and is_indexed_by(param, wrt) and param not in given:
             if param.mutable:
                 _complete(param)

@@ -76,7 +76,7 @@ def recollocate(model: Block, wrt: ContinuousSet | None = None, ncp: int = 3) ->
             _place(wrt, boundaries, ncp)
             with hybrid_expansion(root, wrt):
                 expand_components(root)
-            call_rules_again(root, wrt)
+                call_rules_again(root, wrt)
             for derivative in found:
                 _collocate(derivative, wrt)
             _integrate_again(root, wrt)

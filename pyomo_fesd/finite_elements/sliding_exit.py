@@ -21,7 +21,7 @@ import numpy as np
 from pyomo.core import Constraint, Expression, quicksum
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import BranchConstraint, MovingGrid, homotopy_hints, interpolation_weights
+from pyomo_fesd.core import BranchConstraint, MovingGrid, homotopy_hints, insert, interpolation_weights
 from pyomo_fesd.finite_elements.equilibration import TINY
 
 #: H'(0), relative to the sum of its terms' sizes, below which H leaves zero without a slope.
@@ -60,9 +60,9 @@ def _add_exit_condition(block, condition, e, f, slope, end):
         block.below[index] = -_relative_slope(end, values) / FLAT
         flat += _positive(block.below[index])
     leaves = block.activity[index] * (1 - block.activity[condition.name, f.n])
-    block.arrival.add(index, G == 0)
-    pair = block.exit.add(index, complements(G**2 >= 0, leaves * flat >= 0))
-    homotopy_hints(block).branch_constraints.append(BranchConstraint(pair, block.arrival[index], tentative=True))
+    arrival = insert(block.arrival, index, G == 0)
+    pair = insert(block.exit, index, complements(G**2 >= 0, leaves * flat >= 0))
+    homotopy_hints(block).branch_constraints.append(BranchConstraint(pair, arrival, tentative=True))
 
 
 def _relative_slope(weights, values):

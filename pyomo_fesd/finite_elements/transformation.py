@@ -267,11 +267,17 @@ def _read_continuity(instance, moving, switching, config):
     """Continuity at the inner labels of the conditions; by the equations there if they can matter."""
     conditions, grid = list(switching.by_time()), moving.grid
     labels = {inner_label(by_time, moving.wrt) for by_time in conditions}
-    found = (condition for by_time in conditions for condition in by_time.values())
-    written = not all(isinstance(c, ComplementarityData) and is_generated(c) for c in found)
+    written = not all(map(_is_generated_pair, conditions))
     trace = written or (bool(conditions) and (len(grid.control_stages) > 1 or not grid.right_is_collocated))
     times = TimeIndex(moving.wrt)
     return read_continuity(instance.model(), times, labels, _held(config, moving.wrt), config.continuous, trace)
+
+
+def _is_generated_pair(by_time):
+    """Whether a condition over time is a generated Complementarity; its data are in general those of one component."""
+    if not all(isinstance(c, ComplementarityData) for c in by_time.values()):
+        return False
+    return all(map(is_generated, {id(c.parent_component()): c for c in by_time.values()}.values()))
 
 
 def _read_complementarities(moving, switching, continuity):

@@ -70,12 +70,8 @@ def weight(block: BlockData, index: tuple, system: ModeSystem, modes):
     """Return the sum of nu_i over some of the ``modes``, by number."""
     implicants = system.regions.geometry.implicants
     alpha = [block.alpha[stored_index(key)] for key in _indices(block, index)]
-    own = implicants.covering(frozenset(modes))
-    others = implicants.covering(frozenset(range(len(system.modes))) - frozenset(modes))
-    if len(others) == 1 and sum(map(abs, others[0])) == 1:
-        # the other side of one function
-        own = [tuple(-sign for sign in others[0])]
-    return sum(prod(a if sign > 0 else 1 - a for a, sign in zip(alpha, row) if sign) for row in own)
+    rows = implicants.weighing(frozenset(modes), len(system.modes))
+    return sum(prod(a if sign > 0 else 1 - a for a, sign in zip(alpha, row) if sign) for row in rows)
 
 
 def owners(block: BlockData, index: tuple, system: ModeSystem) -> Iterable:

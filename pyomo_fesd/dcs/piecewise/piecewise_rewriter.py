@@ -21,14 +21,14 @@ from pyomo.core.expr.visitor import ExpressionReplacementVisitor
 from pyomo.dae import Integral
 from pyomo.gdp import Disjunct, Disjunction
 from pyomo.mpec import Complementarity
+from pyomo.mpec.complementarity import ComplementarityData
 
 from pyomo_fesd.core import (
+    DISCRETISATION,
     GENERATED,
     FesdError,
-    components_reader,
     contains_node,
     discretised,
-    is_discretisation_equation,
     is_generated,
     own_data,
 )
@@ -60,8 +60,9 @@ class PiecewiseRewriter:
 
     def _contains(self, source):
         """Whether a component contains a piecewise function."""
-        sides = _complementarity_sides(source) if source.ctype is Complementarity else (source.expr,)
-        return any(contains_node(side, NODES, self._enters) for side in sides)
+        if not isinstance(source, ComplementarityData):
+            return contains_node(source.expr, NODES, self._enters)
+        return any(contains_node(side, NODES, self._enters) for side in _complementarity_sides(source))
 
     def _enters(self, named):
         return not self.waits(named)
@@ -166,14 +167,17 @@ class _Survey:
 
     def __init__(self, block, times):
         self.piecewise, self.functions, sources = [], [], {}
-        sought_in = components_reader(block, SOUGHT, active=True)
         for place in block.block_data_objects(active=True, descend_into=EVERYWHERE):
             if univariate.is_piecewise(place) and times.time(place) is not None:
                 self.piecewise.append(place)
                 continue
             generated = is_generated(place)
-            for component in sought_in(place):
-                if component.ctype is PiecewiseLinearFunction:
+            # to ask Pyomo for the components of several types takes longer than to look at all
+            for component in place.component_map().values():
+                ctype = component.ctype
+                if ctype not in SOUGHT or not component.active:
+                    continue
+                if ctype is PiecewiseLinearFunction:
                     self.functions += _active(component)
                 elif not generated and not _is_ours(component):
                     for data in _active(component):
@@ -190,7 +194,8 @@ def _active(component):
 
 def _is_ours(component):
     """Whether pyomo.dae or this package has written a component beside those of the user."""
-    return component.local_name.startswith(GENERATED) or is_discretisation_equation(component)
+    name = component.local_name
+    return name.startswith(GENERATED) or name.endswith(DISCRETISATION)
 
 
 def _complementarity_sides(condition):

@@ -62,14 +62,17 @@ def read_logic(blocks, trees, times) -> list[Proposition]:
     FesdError
         for a BooleanVar over time other than an indicator, and for literals other than modes of the same time
     """
+    constraints = [constraint for block in blocks for constraint in _constraints_over_time(block, times)]
+    if not constraints:
+        return []
     owners = ComponentMap((d.indicator_var, (tree, d)) for tree in trees for d in tree.disjuncts())
-    found = []
-    for block in blocks:
-        _refuse_boolean_over_time(block, times)
-        for constraint in block.component_data_objects(LogicalConstraint, active=True, descend_into=Block):
-            if times.time(constraint) is not None:
-                found.append(_read_proposition(constraint, owners, times))
-    return found
+    return [_read_proposition(constraint, owners, times) for constraint in constraints]
+
+
+def _constraints_over_time(block, times):
+    _refuse_boolean_over_time(block, times)
+    found = block.component_data_objects(LogicalConstraint, active=True, descend_into=Block)
+    return [constraint for constraint in found if times.time(constraint) is not None]
 
 
 def _refuse_boolean_over_time(block, times):

@@ -85,7 +85,7 @@ def read_laws(modes, equations, conditions: list) -> list:
     readers = [DomainReader(mode, c) for mode, c in zip(modes, conditions)]
     return [
         [reader.implicit(con.body - con.upper, equations.defined) for con in equations.equations[i]]
-        if None in f
+        if equations.is_implicit(i)
         else [Law() if _is_shared(equations, j) else Law(reader.read(f_j)) for j, f_j in enumerate(f)]
         for i, (reader, f) in enumerate(zip(readers, equations.rhs))
     ]

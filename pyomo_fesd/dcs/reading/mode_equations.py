@@ -44,6 +44,11 @@ class ModeEquations:
         """Return those of modes that state regions alone, as they may at the first time: which mode begins."""
         return cls([], [[] for _ in equations], equations, [[] for _ in equations], [])
 
+    def is_implicit(self, mode: int) -> bool:
+        """Return whether a mode has no explicit form."""
+        # Pyomo compares expressions with None at length
+        return any(f is None for f in self.rhs[mode])
+
     def stamped(self, stamp: Stamp, parts: list, equations: list) -> 'ModeEquations':
         """Return the same for other ``parts``, and the ``equations`` that contain these."""
         others = {id(con): other for con, other in zip(chain(*self.equations), chain(*equations))}

@@ -43,6 +43,16 @@ class SignImplicants:
             self._found[modes] = _merged([row for i, row in enumerate(self.rows) if i in modes], np.array(self.touchable))
         return self._found[modes]
 
+    def weighing(self, modes, number):
+        """Return rows whose weights add up to that of some ``modes`` out of a ``number``."""
+        if (modes, number) not in self._found:
+            # the other side of one function is shorter
+            others = self.covering(frozenset(range(number)) - modes)
+            opposite = len(others) == 1 and sum(map(abs, others[0])) == 1
+            rows = [tuple(-sign for sign in others[0])] if opposite else self.covering(modes)
+            self._found[modes, number] = rows
+        return self._found[modes, number]
+
 
 def sign_implicants(signs, touchable):
     """Return the rows of a sign matrix with signs left out; None if they do not cover every touchable pattern exactly once."""

@@ -43,6 +43,14 @@ class ModeSystem:
         """The outermost DisjunctionData."""
         return self.tree.disjunction
 
+    def parts(self) -> list[tuple]:
+        """Return every disjunct with the numbers of the modes that it is part of; none for one that is switched off."""
+        numbers = {}
+        for i, mode in enumerate(self.modes):
+            for disjunct in mode.disjuncts:
+                numbers.setdefault(id(disjunct), []).append(i)
+        return [(disjunct, numbers.get(id(disjunct), [])) for disjunct in self.tree.disjuncts()]
+
 
 @dataclass(frozen=True)
 class HysteresisSystem(ModeSystem):
@@ -100,8 +108,8 @@ class SystemReader:
             lambda v: (*self._variables.kind(v), v.lb, v.ub),
         )
         self._refuse_foreign(tree, modes, [*equalities, *inequalities], parts)
-        if (counts, key) in self._read:
-            first, stamp = self._read[counts, key]
+        first, stamp = self._read.get((counts, key), (None, None))
+        if first is not None:
             regions = Regions([stamp.expression(c, parts) for c in first.regions.functions], first.regions.geometry)
             return ModeSystem(tree, modes, regions, first.equations.stamped(stamp, parts, equalities), first.laws)
         system = self._study(tree, modes, equalities, inequalities)

@@ -1,0 +1,19 @@
+"""Add content at an index that is known to belong to the index set of a component.
+
+Pyomo's own ``add`` looks the index up in the index set, whose product of Sets takes longer to search than all the rest.  This
+function calls what Pyomo calls after the search, a method that its own component types override.
+
+Takes: a Constraint or Complementarity, an index tuple at which it has no content yet, and the content.
+Leaves: the content.
+Does not apply: to an index that a user gives, or that may have content.
+"""
+
+from pyomo.core.base.component import ComponentData
+from pyomo.core.base.indexed_component import IndexedComponent
+
+from pyomo_fesd.core.time_index import stored_index
+
+
+def insert(component: IndexedComponent, index: tuple, content) -> ComponentData:
+    """Add ``content`` at ``index`` and return its data."""
+    return component._setitem_when_not_present(stored_index(index), content)
