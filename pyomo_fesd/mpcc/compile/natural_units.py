@@ -162,13 +162,13 @@ class _Evidence:
 
     def fit(self, n, columns, bounds):
         """Logarithms of the n sizes by least squares; ``columns`` have ``bounds``."""
-        k, width = np.arange(len(self.row)), n + 1 + self._rows
-        entries = [(k, self.first, 1.0), (k, self.second, 1.0), (k, n + 1 + self.row, -1.0)]
-        A = sum(sparse.csr_matrix((np.full(len(k), v), (i, j)), (len(k), width)) for i, j, v in entries)
-        j = np.arange(len(columns))
-        of_bounds = sparse.csr_matrix((np.full(len(j), BOUNDS), (j, columns)), (len(j), width))
-        keep = np.delete(np.arange(width), n)
-        stacked = sparse.vstack([A, of_bounds, GUESS * sparse.eye(n, width)]).tocsc()[:, keep]
+        m, k = len(self.row), np.arange(len(self.row))
+        parts = [(k, self.first, 1.0), (k, self.second, 1.0), (k, n + 1 + self.row, -1.0)]
+        parts += [(m + np.arange(len(columns)), columns, BOUNDS), (m + len(columns) + np.arange(n), np.arange(n), GUESS)]
+        i, j, v = (np.concatenate(some) for some in zip(*((i, j, np.full(len(i), v)) for i, j, v in parts)))
+        # column n is that of numbers without a variable
+        known, j = j != n, j - (j > n)
+        stacked = sparse.csr_matrix((v[known], (i[known], j[known])), (m + len(columns) + n, n + self._rows))
         right = np.concatenate([-self.logarithm, BOUNDS * np.log(bounds), np.zeros(n)])
         return lsqr(stacked, right, atol=1e-10, btol=1e-10)[0][:n]
 
