@@ -137,7 +137,7 @@ class _Assembly:
         """Jacobian (csr) of ``functions`` at ``w``, found once: nobody may change it."""
         key = id(functions), w.tobytes()
         if key not in self._slopes:
-            self._slopes[key] = csr(functions.jacobian(self._at(w)))
+            self._slopes[key] = functions.coefficients if functions.is_linear else csr(functions.jacobian(self._at(w)))
         return self._slopes[key]
 
     def _at(self, w):

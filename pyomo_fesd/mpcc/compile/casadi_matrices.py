@@ -7,8 +7,10 @@ from scipy import sparse
 
 def csr(J):
     """casadi DM to scipy csr."""
-    colptr, row = np.array(J.sparsity().colind()), np.array(J.sparsity().row())
-    return sparse.csc_matrix((np.array(J.nonzeros(), dtype=float), row, colptr), shape=J.shape).tocsr()
+    # the columns of the transpose are the rows; scipy's own conversion takes longer
+    T = J.T
+    pattern = T.sparsity()
+    return sparse.csr_matrix((np.array(T.nonzeros(), dtype=float), pattern.row(), pattern.colind()), shape=J.shape)
 
 
 def csr_pattern(J):
@@ -17,11 +19,9 @@ def csr_pattern(J):
 
 
 def dm(matrix):
-    """scipy to casadi DM; lists are much faster than arrays here."""
-    matrix = matrix.tocsc()
-    matrix.sort_indices()
-    sparsity = ca.Sparsity(*matrix.shape, matrix.indptr.tolist(), matrix.indices.tolist())
-    return ca.DM(sparsity, matrix.data.tolist())
+    """scipy csr, with sorted indices, to casadi DM; lists are much faster than arrays here."""
+    m, n = matrix.shape
+    return ca.DM(ca.Sparsity(n, m, matrix.indptr.tolist(), matrix.indices.tolist()), matrix.data.tolist()).T
 
 
 def take(column, positions):

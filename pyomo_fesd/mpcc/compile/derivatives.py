@@ -178,7 +178,8 @@ def with_parts(nlp: Nlp, up, down) -> Nlp:
 
 def _at(expression, inputs, values):
     """An SX expression at ``values``, of which only those that it depends on are evaluated."""
-    used = [k for k, symbol in enumerate(inputs) if symbol.numel() and ca.depends_on(expression, symbol)]
+    is_fixed = expression.is_constant()
+    used = [k for k, symbol in enumerate(inputs) if not is_fixed and symbol.numel() and ca.depends_on(expression, symbol)]
     function = ca.Function('piece', [inputs[k] for k in used], [expression])
     return function.call([values[k] for k in used])[0] if used else type(values[0])(ca.evalf(expression))
 

@@ -40,11 +40,12 @@ def grouped_rows(functions: list, column: dict, free: int, parts: NonlinearParts
 
 
 def _linear(rows, shape, column):
-    counts = [len(row.linear) for _, row in rows]
-    at = np.repeat(np.array([i for i, _ in rows], dtype=int), counts)
-    of = np.fromiter((column[k] for _, row in rows for k in row.linear), int, len(at))
+    """The linear terms of all (row, Row), which are in the order of the rows, as csr."""
+    counts = np.bincount([i for i, _ in rows], [len(row.linear) for _, row in rows], shape[0]) if rows else np.zeros(shape[0])
     data = np.array(list(chain.from_iterable(row.linear.values() for _, row in rows)), dtype=float)
-    matrix = sparse.coo_matrix((data, (at, of)), shape).tocsr()
+    of = np.fromiter((column[k] for _, row in rows for k in row.linear), int, len(data))
+    matrix = sparse.csr_matrix((data, of, np.concatenate([[0], np.cumsum(counts)]).astype(int)), shape)
+    matrix.sum_duplicates()
     matrix.eliminate_zeros()
     return matrix
 

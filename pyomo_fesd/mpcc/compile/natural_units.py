@@ -22,7 +22,7 @@ from scipy.sparse.linalg import lsqr
 
 from pyomo_fesd.mpcc.compile.casadi_matrices import csr
 from pyomo_fesd.mpcc.compile.scaling import MILD
-from pyomo_fesd.mpcc.compile.sparse_entries import largest_entries, major_index
+from pyomo_fesd.mpcc.compile.sparse_entries import largest_entries, major_index, with_entries
 
 #: Variables of a size within these bounds keep their unit: small ones are measured by 1, large ones by their value.
 ORDINARY = (1e-2, 1e4)
@@ -110,11 +110,7 @@ def _samples(c, sizes):
 
 def _largest(J, sizes):
     """The largest entry of each row over the sizes, 0 for what cannot be evaluated."""
-    if 0 in J.shape:
-        return np.zeros(J.shape[0])
-    J, largest = J.tocoo(), np.zeros(J.shape[0])
-    np.maximum.at(largest, J.row, np.nan_to_num(np.abs(J.data * sizes[J.col]), nan=0.0, posinf=0.0))
-    return largest
+    return largest_entries(with_entries(J, np.nan_to_num(np.abs(J.data * sizes[J.indices]), nan=0.0, posinf=0.0)))
 
 
 def _sizes(c):
@@ -162,13 +158,13 @@ class _Evidence:
 
     def fit(self, n, columns, bounds):
         """Logarithms of the n sizes by least squares; ``columns`` have ``bounds``."""
-        k, width = np.arange(len(self.row)), n + 1 + self._rows
-        entries = [(k, self.first, 1.0), (k, self.second, 1.0), (k, n + 1 + self.row, -1.0)]
-        A = sum(sparse.csr_matrix((np.full(len(k), v), (i, j)), (len(k), width)) for i, j, v in entries)
-        j = np.arange(len(columns))
-        of_bounds = sparse.csr_matrix((np.full(len(j), BOUNDS), (j, columns)), (len(j), width))
-        keep = np.delete(np.arange(width), n)
-        stacked = sparse.vstack([A, of_bounds, GUESS * sparse.eye(n, width)]).tocsc()[:, keep]
+        m, k = len(self.row), np.arange(len(self.row))
+        parts = [(k, self.first, 1.0), (k, self.second, 1.0), (k, n + 1 + self.row, -1.0)]
+        parts += [(m + np.arange(len(columns)), columns, BOUNDS), (m + len(columns) + np.arange(n), np.arange(n), GUESS)]
+        i, j, v = (np.concatenate(some) for some in zip(*((i, j, np.full(len(i), v)) for i, j, v in parts)))
+        # column n is that of numbers without a variable
+        known, j = j != n, j - (j > n)
+        stacked = sparse.csr_matrix((v[known], (i[known], j[known])), (m + len(columns) + n, n + self._rows))
         right = np.concatenate([-self.logarithm, BOUNDS * np.log(bounds), np.zeros(n)])
         return lsqr(stacked, right, atol=1e-10, btol=1e-10)[0][:n]
 
@@ -218,11 +214,11 @@ def _linear(here, there, values, bounds, w, cancelling, hidden):
     ``cancelling`` are the sizes of terms without variables; the right-hand side of a ``hidden`` one is no evidence where it is
     smaller than the coefficients.
     """
-    n, m, largest, here = len(w), np.arange(len(values)), largest_entries(here), here.tocoo()
+    n, m, largest, at = len(w), np.arange(len(values)), largest_entries(here), major_index(here)
     changed = here.data != there.data
-    varies = np.bincount(here.row[changed], minlength=len(m)) > 0
-    products = here.data * w[here.col]
-    terms, sizes = np.bincount(here.row, products, len(m)), np.bincount(here.row, np.abs(products), len(m)) + cancelling
+    varies = np.bincount(at[changed], minlength=len(m)) > 0
+    products = here.data * w[here.indices]
+    terms, sizes = np.bincount(at, products, len(m)), np.bincount(at, np.abs(products), len(m)) + cancelling
     left = values - terms
     left = np.where(np.abs(left) > ROUND_OFF * np.maximum(np.abs(values), sizes), left, 0.0)
     left = np.where(varies, 0.0, left)
@@ -231,7 +227,7 @@ def _linear(here, there, values, bounds, w, cancelling, hidden):
     equation = sides[0] == sides[1]
     sides[1] = np.where(equation, 0.0, sides[1])
     sides[0] = np.where(equation & hidden & (np.abs(sides[0]) < largest), 0.0, sides[0])
-    row, first = np.concatenate([here.row[~changed], m, m]), np.concatenate([here.col[~changed], np.full(2 * len(m), n)])
+    row, first = np.concatenate([at[~changed], m, m]), np.concatenate([here.indices[~changed], np.full(2 * len(m), n)])
     numbers = np.concatenate([here.data[~changed], *sides])
     return row, first, np.full(len(row), n), np.nan_to_num(numbers, posinf=0.0, neginf=0.0)
 

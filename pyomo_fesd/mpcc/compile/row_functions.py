@@ -68,6 +68,16 @@ class RowFunctions:
         J = csr(self.jacobian_by_parameters(x))
         return np.nan_to_num(abs(J) @ np.abs(x[self.free :].full().ravel()), posinf=0.0)
 
+    @property
+    def is_linear(self) -> bool:
+        """Whether there are no nonlinear parts."""
+        return not self.classes
+
+    @property
+    def coefficients(self):
+        """The free variables' part of A (csr): the Jacobian of linear functions."""
+        return self.linear if self.linear.shape[1] == self.free else self.linear[:, : self.free]
+
     @cached_property
     def nonlinear(self) -> np.ndarray:
         """Mask over the rows that are not linear in the free variables."""

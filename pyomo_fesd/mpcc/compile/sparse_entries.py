@@ -1,7 +1,5 @@
 """Entries of scipy's csr and csc matrices by rows, without the matrices that scipy makes on the way."""
 
-from copy import copy
-
 import numpy as np
 
 
@@ -23,6 +21,7 @@ def with_entries(matrix, numbers):
 
     The arrays of indices are shared.  scipy's constructor takes longer than all that is calculated with a small matrix.
     """
-    new = copy(matrix)
-    new.data = numbers
+    kind = matrix.__class__
+    new = kind.__new__(kind)
+    new.__dict__.update(matrix.__dict__, data=numbers)
     return new

@@ -9,6 +9,7 @@ Does not apply: where the bounds of an assignment contradict each other; ``solve
 """
 
 from dataclasses import replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -52,12 +53,17 @@ class Branch:
         rows = take(z, inner)
         nlp = composed(c, Outer(z, ca.SX(0, 1), weight, ca.SX(0), rows, weight))
         self._pattern = csr_pattern(nlp.derivatives.jacobian)
-        self._values = ca.Function('rows', [nlp.x, nlp.p], [nlp.g])
+        self._rows = [nlp.x, nlp.p], [nlp.g]
         m = len(c.lbg)
         self._differences = Differences(c, nlp, np.array([*range(m), *(m + i for i in inner)], dtype=int))
         given = nlp.x, nlp.p, nlp.f, nlp.g
         exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': max(OPTIMALITY * min(1.0, c.scale.f), LEAST)}
         self._nlp, self._far = (make('branch', *given, budget, nlp.derivatives) for budget in (NEAR | exact, exact))
+
+    @cached_property
+    def _values(self):
+        # few branches have a row without free variables
+        return ca.Function('rows', *self._rows)
 
     def solve(self, w, zero, equal=None, weight=0.0, settled=ROW_TOLERANCE, far=False, box=None, **more):
         """Solve the branch ``zero`` from ``w``.

@@ -12,6 +12,9 @@ that a point within 1e-6 reach has no descent there.  Neither factors of f, w an
 below FLOOR times the largest N of the objective alone are round-off of the NLP solver.
 """
 
+from copy import copy
+from functools import cached_property
+
 import numpy as np
 
 from pyomo_fesd.mpcc.compile import major_index
@@ -36,18 +39,18 @@ class Descent:
     """
 
     def __init__(self, program, changes):
-        self._p, self._changes, self._known = program, changes, None
+        self._p, self._terms = program, _Terms(program, changes)
 
     def of(self, program):
         """The same for a program that differs in its bounds only."""
-        other = Descent(program, self._changes)
-        other._known = self._known
+        other = copy(self)
+        other._p = program
         return other
 
     def with_rows(self, program, own):
         """The same for a program with more rows, which never change; ``own(y)`` are the multipliers of the others."""
         return Descent(
-            program, lambda: [(cost, lambda y, of_rows=of_rows: of_rows(own(y))) for cost, of_rows in self._known_changes()]
+            program, lambda: [(cost, lambda y, of_rows=of_rows: of_rows(own(y))) for cost, of_rows in self._terms.changes]
         )
 
     def value(self, d) -> float:
@@ -57,11 +60,11 @@ class Descent:
     def proved(self, y) -> float:
         """The largest relative descent that multipliers ``y`` (rows, positive at ``low``) leave possible."""
         p = self._p
-        (m, n), A, row = p.A.shape, p.A, major_index(p.A)
+        (m, n), A, row, entries = p.A.shape, p.A, self._terms.row, self._terms.entries
         y, columns, rows = self._bounds(y)
-        entries, products = np.abs(A.data), np.abs(A.data) * np.abs(y)[row]
+        products = entries * np.abs(y)[row]
         size = (np.abs(p.cost) + np.bincount(A.indices, products, n) + self._curvature(y)) * p.reach
-        floor = FLOOR * self._reach_of_objective()
+        floor = FLOOR * self._terms.reach_of_objective
         by_columns = _ratios(columns, size, floor)
         # a row's term is y_i times its slack: as large as its part in a column, and relative to what the row can move
         of_rows = np.zeros(m)
@@ -80,8 +83,8 @@ class Descent:
             zero, and where that is more than round-off nothing is proved
         """
         p = self._p
-        m, A, row = len(y), p.A, major_index(p.A)
-        entries, along = np.abs(A.data), [self._by_columns(A.data * step[row]) for step in steps]
+        m, A, row, entries = len(y), p.A, self._terms.row, self._terms.entries
+        along = [self._by_columns(A.data * step[row]) for step in steps]
         y_low, y_high = _between(y, steps)
         clipped = clipped + np.where(np.isneginf(p.low), np.maximum(y_high, 0.0), 0.0)
         clipped = clipped + np.where(np.isposinf(p.high), np.maximum(-y_low, 0.0), 0.0)
@@ -96,7 +99,7 @@ class Descent:
         most = np.maximum(np.abs(y_low), np.abs(y_high))
         least = np.where(y_low * y_high > 0, np.minimum(np.abs(y_low), np.abs(y_high)), 0.0)
         size = (np.abs(p.cost) + self._by_columns(entries * least[row]) + self._least_curvature(y, steps)) * p.reach
-        floor, rows = FLOOR * self._reach_of_objective(), most * slack
+        floor, rows = FLOOR * self._terms.reach_of_objective, most * slack
         of_rows = np.zeros(m)
         np.maximum.at(of_rows, row, entries * most[row] * (p.reach / np.maximum(size, SMALLEST))[A.indices])
         by_rows = _ratios(rows, most * np.bincount(row, entries * p.reach[A.indices], m), floor) * np.minimum(of_rows, 1.0)
@@ -112,14 +115,14 @@ class Descent:
         """Whether a value of the program is round-off: below the part ``floor`` of the objective's largest term."""
         # the changes, which take longer to find than a small program to solve, only make the largest term larger
         least = float(np.max(np.abs(self._p.cost) * self._p.reach, initial=0.0))
-        return -value <= floor * least or -value <= floor * self._reach_of_objective()
+        return -value <= floor * least or -value <= floor * self._terms.reach_of_objective
 
     def _bounds(self, y):
         """Multipliers of the right sign, and by how much each column and each row may descend."""
         p = self._p
         y = np.where(np.isneginf(p.low), np.minimum(y, 0.0), y)
         y = np.where(np.isposinf(p.high), np.maximum(y, 0.0), y)
-        reduced = p.cost - np.bincount(p.A.indices, p.A.data * y[major_index(p.A)], len(p.cost))
+        reduced = p.cost - np.bincount(p.A.indices, p.A.data * y[self._terms.row], len(p.cost))
         return y, -_least(reduced, p.lower, p.upper), -_least(y, p.low, p.high)
 
     def _by_columns(self, numbers):
@@ -129,22 +132,47 @@ class Descent:
     def _least_curvature(self, y, steps):
         """The least that ``_curvature`` may be of ``y`` plus any of the ``steps``."""
         found = np.zeros(len(self._p.cost))
-        for cost, of_rows in self._known_changes():
+        for cost, of_rows in self._terms.changes:
             found = np.maximum(found, np.abs(cost - of_rows(y)) - sum(np.abs(of_rows(step)) for step in steps))
         return found
 
     def _curvature(self, y):
-        along = [np.abs(cost - of_rows(y)) for cost, of_rows in self._known_changes()]
+        along = [np.abs(cost - of_rows(y)) for cost, of_rows in self._terms.changes]
         return np.max(along, axis=0) if along else 0.0
 
-    def _reach_of_objective(self):
-        sizes = [np.abs(self._p.cost), *(np.abs(cost) for cost, _ in self._known_changes())]
-        return float(np.max(np.max(sizes, axis=0) * self._p.reach, initial=0.0))
 
-    def _known_changes(self):
-        if self._known is None:
-            self._known = self._changes()
-        return self._known
+class _Terms:
+    """Terms of a program that are the same whatever its bounds; found when they are first needed.
+
+    Attributes
+    ----------
+    row, entries : arrays
+        row and size of each coefficient
+    changes : list
+        as given to ``Descent``
+    reach_of_objective : float
+        the largest term of the objective
+    """
+
+    def __init__(self, program, changes):
+        self._p, self._changes = program, changes
+
+    @cached_property
+    def row(self):
+        return major_index(self._p.A)
+
+    @cached_property
+    def entries(self):
+        return np.abs(self._p.A.data)
+
+    @cached_property
+    def changes(self):
+        return self._changes()
+
+    @cached_property
+    def reach_of_objective(self):
+        sizes = [np.abs(self._p.cost), *(np.abs(cost) for cost, _ in self.changes)]
+        return float(np.max(np.max(sizes, axis=0) * self._p.reach, initial=0.0))
 
 
 def _between(at, steps):

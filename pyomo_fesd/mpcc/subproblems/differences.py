@@ -14,7 +14,7 @@ Leaves: bounds, start and trust region with one variable for each difference; an
 import casadi as ca
 import numpy as np
 
-from pyomo_fesd.mpcc.compile import LastPoints, csr_pattern
+from pyomo_fesd.mpcc.compile import LastPoints
 
 #: Digits to which the entries of two columns agree.
 DIGITS = 12
@@ -35,8 +35,8 @@ class Differences:
     def __init__(self, c, nlp, rows):
         self._c, self._rows = c, rows
         # without an entry in gradient and Hessian a variable is in no cost, and linear in all rows
-        in_hessian = csr_pattern(nlp.derivatives.hessian)
-        used = np.diff(in_hessian.indptr) + np.diff(in_hessian.tocsc().indptr)
+        in_hessian = nlp.derivatives.hessian.sparsity()
+        used = np.bincount(np.array([*in_hessian.row(), *in_hessian.get_col()], dtype=int), minlength=nlp.x.numel())
         used[ca.jacobian_sparsity(nlp.f, nlp.x).get_col()] += 1
         (self._among,) = np.nonzero((used == 0) & (c.lbx == 0.0) & (c.ubx == np.inf))
         # slopes may contain parameters

@@ -67,7 +67,7 @@ class PairProgram:
 
     def own(self, y):
         """Multipliers without those of the rows that are no rows of the LPEC."""
-        return np.delete(y, self.more)
+        return np.delete(y, self.more) if self._drifts else y
 
 
 def undecided(drifts, zeros, pairs):

@@ -143,7 +143,8 @@ class PairSearch:
         """Whether multipliers show that nothing in a node counts."""
         node = self._descent.of(self._p.with_sides(sides))
         least = node.least(y)
-        return (node.proved(y) <= self._enough or self._descent.negligible(least)) and not self._matters(least)
+        # the last question takes by far the longest to answer
+        return not self._matters(least) and (self._descent.negligible(least) or node.proved(y) <= self._enough)
 
     def _without_either(self, needed, y):
         """The sides that a proof needs, without those that may be either one.
