@@ -9,6 +9,7 @@ from pyomo.mpec import Complementarity, complements
 from pyomo_fesd.mpcc.compile.compile import compile_mpcc
 from pyomo_fesd.mpcc.compile.natural_units import natural_units
 from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc
+from pyomo_fesd.mpcc.compile.row_functions import RowFunctions
 
 TINY = 1e-10
 
@@ -56,3 +57,11 @@ def test_without_an_objective_a_model_sized_by_starts_is_not_evaluated():
     c = compile_mpcc(read_mpcc(m), HierarchicalTimer(), natural_units='starts')
     assert c.scale.x[0] < 1e-6
     assert '_jacobian' not in vars(c) and natural_units(c, True).ordinary and '_jacobian' not in vars(c)
+
+
+def test_the_coefficients_of_linear_rows_are_their_jacobian(monkeypatch):
+    rows = lambda m: m.x[0] == 1e10, lambda m: m.y[0] + 2 * m.y[1] == TINY  # noqa: E731
+    found = scales(*rows)
+    monkeypatch.setattr(RowFunctions, 'is_linear', False)
+    assert found.min() < 1e-4 and found.max() > 1e8
+    np.testing.assert_array_equal(found, scales(*rows))

@@ -13,7 +13,6 @@ from pyomo.repn.plugins.nl_writer import NLWriter
 
 from pyomo_fesd.mpcc.compile import assemble, grouped_rows, row_classes, scaled_functions
 from pyomo_fesd.mpcc.compile.derivatives import automatic, plain_nlp
-from pyomo_fesd.mpcc.compile.row_functions import RowFunctions
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS, Relaxation
 from pyomo_fesd.mpcc.subproblems.side_constraints import sort_sides
 
@@ -188,18 +187,3 @@ def test_a_side_that_is_a_parameter_keeps_its_unit():
     c = compiled(m, [m.given])
     assert c.pairs == 2
     np.testing.assert_array_equal(c.scale.sides, np.ones(4))
-
-
-def test_the_coefficients_of_linear_rows_are_their_jacobian(monkeypatch):
-    m = pyo.ConcreteModel()
-    m.p = pyo.Param(initialize=1e-6, mutable=True)
-    m.x = pyo.Var(range(3), bounds=(0, None))
-    m.rows = pyo.Constraint(range(2), rule=lambda m, i: 1e-6 * m.x[i] + 2e-6 * m.x[i + 1] + m.p == 4e-6)
-    m.pair = Complementarity(expr=complements(m.x[0] >= 0, m.x[2] - m.x[1] >= 0))
-    m.cost = pyo.Objective(expr=m.x[0] + 1e-8 * m.x[1])
-    scale = compiled(m, [m.p]).scale
-    monkeypatch.setattr(RowFunctions, 'is_linear', False)
-    again = compiled(m, [m.p]).scale
-    assert np.all(scale.g > 1.0)
-    for kind in ('x', 'g', 'f', 'sides'):
-        np.testing.assert_array_equal(getattr(scale, kind), getattr(again, kind))
