@@ -2,7 +2,7 @@
 
 import pyomo.environ as pyo
 import pytest
-from problems import free_start
+from problems import contacts, free_start
 from pyomo import mpec
 
 from pyomo_fesd.mpcc.algorithm.subsolves import STEEP, STEEPEST_ROW
@@ -52,4 +52,11 @@ def test_a_problem_without_parts_has_ipopts_own_scaling(budgets):
     m.rows = mpec.Complementarity(expr=mpec.complements(m.x >= 0, m.y >= 0))
     m.cost = pyo.Objective(expr=1e3 * (m.x - 1) ** 2 + m.y)
     pyo.SolverFactory('mpec_hybrid').solve(m)
+    assert budgets and not any('nlp_scaling_max_gradient' in budget for _, budget in budgets)
+
+
+def test_beside_impacts_ipopt_scales_as_ever(budgets):
+    m = contacts.ball(0.5)
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=4, ncp=2)
+    pyo.SolverFactory('mpec_hybrid').solve(m, simulate_first=False)
     assert budgets and not any('nlp_scaling_max_gradient' in budget for _, budget in budgets)
