@@ -2,7 +2,7 @@
 
     .venv/bin/python docs/benchmarks/profile/transformations.py
 
-The gas-liquid tank on N elements of three Radau points: ``fesd.dcs`` and ``fesd.finite_elements``, beside ``dae.collocation`` of the
+The gas-liquid tank on N elements of three Radau points: ``fesd.dcs`` and ``fesd.finite_elements``; and ``dae.collocation`` of the
 same balances with a valve that lets only liquid through, so without a switch.  Both in turns, as the machine may have other work.
 Writes transformations.csv beside this file: medians over the runs, and their ratio.
 """
