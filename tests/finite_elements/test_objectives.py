@@ -36,8 +36,9 @@ def discretised(m):
         (lambda m: m.cost.set_value(WEIGHT * m.cost.expr), WEIGHT / 3),
         (lambda m: m.cost.set_value(m.first + WEIGHT * m.each[2]), 1 / 3 + WEIGHT * 4 / 3),
         (lambda m: m.cost.set_value(WEIGHT * m.x[2, 1]), WEIGHT * 2),
+        (lambda m: m.cost.set_value(WEIGHT), WEIGHT),
     ],
-    ids=['as declared', 'weighted', 'with an indexed integral', 'without an integral'],
+    ids=['as declared', 'weighted', 'with an indexed integral', 'without an integral', 'a number'],
 )
 def test_a_changed_objective_stays_changed(state, value):
     m = ramps()

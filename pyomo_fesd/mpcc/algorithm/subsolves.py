@@ -38,6 +38,8 @@ STUCK, LEFT = 'Restoration_Failed', 1e-8
 #: Ipopt scales rows and an objective down whose gradients at the start of an NLP have larger entries than this; and rows where
 #: parts have extents, without impacts.
 STEEP, STEEPEST_ROW = 1e2, 1e4
+#: How the names of Ipopt's options of this scaling begin.
+OF_SCALING = 'nlp_scaling', 'obj_scaling'
 #: Statuses with which a point is of no use, whatever its violation.
 USELESS = (*INFEASIBLE, DIVERGING)
 #: Iterations that an NLP may use; a relaxation without multipliers to start from may use more.
@@ -221,10 +223,11 @@ class Subsolves:
         """Options with which Ipopt leaves steeper rows as they are where parts have extents, and the objective has its own factor.
 
         The slope of a row by an extent is a rate.  Rates at the start, by which Ipopt would scale rows down, say little of those
-        elsewhere, and rows that are scaled down count less.  None beside impacts, whose impulses may have any size: there fewer
-        points were certified so.  None if the user says how Ipopt scales.
+        elsewhere, and rows that are scaled down count less.  None beside impacts, whose impulses may have any size: no gain was
+        seen there.  None if the user says how Ipopt scales.
         """
-        if not self.parts.all or self._c.impacts or any('scaling' in name for name in self._options.nlp_options.value()):
+        given = any(name.startswith(OF_SCALING) for name in self._options.nlp_options.value())
+        if not self.parts.all or self._c.impacts or given:
             return {}
         slopes = np.abs(self._c.gradients(self._c.x0)[0])
         steepest = slopes[np.isfinite(slopes)].max(initial=STEEP)

@@ -46,6 +46,11 @@ def test_the_user_says_how_ipopt_scales(budgets, options):
     assert budgets and not any('obj_scaling_factor' in budget for _, budget in budgets)
 
 
+def test_another_option_of_the_user_leaves_the_factor(budgets):
+    solve_steep(1e3, nlp_options={'mumps_scaling': 77})
+    assert any(budget['obj_scaling_factor'] < 1.0 for _, budget in budgets)
+
+
 def test_a_problem_without_parts_has_ipopts_own_scaling(budgets):
     m = pyo.ConcreteModel()
     m.x, m.y = (pyo.Var(bounds=(0, None), initialize=1.0) for _ in range(2))
