@@ -110,9 +110,18 @@ def solve(program, options, deadline, start=None, limits=None):
     return None
 
 
+class Silent(highspy.Highs):
+    """HiGHS without output: 1.16 writes its licence, once in a process, as soon as it is given callbacks."""
+
+    def enableCallbacks(self):
+        """Begin without output; the constructor calls this."""
+        self.setOptionValue('output_flag', False)
+        super().enableCallbacks()
+
+
 def highs_of(p, settings):
     """HiGHS with an equilibrated program and these settings."""
-    highs = highspy.Highs()
+    highs = Silent()
     set_options(highs, settings)
     highs.passModel(_highs_model(p))
     return highs
@@ -126,8 +135,7 @@ def set_options(highs, settings):
 
 def refusal(options: dict) -> str | None:
     """Return HiGHS' answer if it refuses one of these options, else None."""
-    highs = highspy.Highs()
-    highs.setOptionValue('output_flag', False)
+    highs = Silent()
     try:
         refused = [name for name, option in options.items() if highs.setOptionValue(name, option) != highspy.HighsStatus.kOk]
     except TypeError as error:
@@ -137,8 +145,7 @@ def refusal(options: dict) -> str | None:
 
 def infeasible(program) -> bool:
     """Whether HiGHS shows that a program has no point."""
-    highs = highspy.Highs()
-    highs.setOptionValue('output_flag', False)
+    highs = Silent()
     highs.setOptionValue('threads', THREADS['threads'])
     highs.passModel(_highs_model(program.equilibrated()[0]))
     run(highs)
@@ -194,7 +201,7 @@ def _attempts(p):
 
 def settings_of(attempt, binaries, deadline, given):
     """HiGHS options of one attempt; those that are ``given`` override ours, except for the deadline."""
-    settings = {'output_flag': False} | THREADS | {name: value for name, value in attempt.items() if name != 'tolerance'}
+    settings = THREADS | {name: value for name, value in attempt.items() if name != 'tolerance'}
     if binaries:
         settings.pop('solver', None)
         settings |= GAPS | STARTED

@@ -73,6 +73,19 @@ def test_after_it_another_tool_runs_with_its_number_of_threads(many_threads, thr
     assert highs_with(threads) == highspy.HighsStatus.kOk
 
 
+SOLVES = """
+from tests.mpcc.subproblems.test_linear_program import Deadline, knapsack, solve
+
+solve(knapsack(), {}, Deadline())
+"""
+
+
+def test_highs_writes_nothing():
+    # in a process of its own, as HiGHS writes its licence once in a process
+    done = subprocess.run([sys.executable, '-c', SOLVES], check=True, capture_output=True, text=True, timeout=100)
+    assert (done.stdout, done.stderr) == ('', '')
+
+
 FORKS = """
 import faulthandler, os
 from tests.mpcc.subproblems.test_linear_program import Deadline, highs_with, knapsack, solve
