@@ -28,9 +28,13 @@ class Stationarity(Enum):
     INFEASIBLE = "not certified: the point is not feasible"
 
 
-@dataclass(frozen=True)
+#: As many entries of a direction are printed, the largest ones.
+SHOWN = 6
+
+
+@dataclass(frozen=True, repr=False)
 class Certificate:
-    """The grade of one point and its residuals.
+    """The grade of one point and its residuals; prints them in a few lines.
 
     Attributes
     ----------
@@ -67,6 +71,21 @@ class Certificate:
     def feasible(self):
         """Whether rows, bounds and pairs hold."""
         return self.grade is not Stationarity.INFEASIBLE
+
+    def __repr__(self):
+        lines = [self.grade.value]
+        lines += [f"violation {self.violation:.1e}, complementarity {self.complementarity:.1e}, bi-active pairs: {self.biactive}"]
+        if self.value:
+            lines += [f"slope of the objective along the direction: {self.value:.3g}", *self._entries()]
+        return '\n'.join(lines)
+
+    __str__ = __repr__
+
+    def _entries(self):
+        """Lines for the largest entries of the direction."""
+        moved = sorted(((v, d) for v, d in (self.direction or {}).items() if d), key=lambda entry: -abs(entry[1]))
+        lines = [f"  {v.name} {d:+.3g}" for v, d in moved[:SHOWN]]
+        return lines + [f"  and {len(moved) - SHOWN} others"] * (len(moved) > SHOWN)
 
 
 def certify_point(c, lpec, w, tolerances, equal=None, multipliers=None, patience=None) -> Certificate:

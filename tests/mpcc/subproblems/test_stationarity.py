@@ -9,7 +9,7 @@ import pyomo_fesd
 from pyomo_fesd.core import FesdError, homotopy_hints
 from pyomo_fesd.mpcc.subproblems.lpec import Lpec
 from pyomo_fesd.mpcc.subproblems.side_constraints import sort_sides
-from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity, certify_point
+from pyomo_fesd.mpcc.subproblems.stationarity import SHOWN, Stationarity, certify_point
 
 
 def test_the_origin_of_the_toy_is_refused_with_a_direction_of_descent():
@@ -19,6 +19,25 @@ def test_the_origin_of_the_toy_is_refused_with_a_direction_of_descent():
     assert not certificate.certified
     assert certificate.value < -1
     assert certificate.biactive == 1
+
+
+def test_a_certificate_prints_its_grade_residuals_and_the_largest_entries_of_the_direction():
+    refused, certified = (str(pyomo_fesd.certify(small_mpccs.toy(x, 0.0)[0])) for x in (0.0, 1.0))
+    assert refused.splitlines() == [
+        Stationarity.DESCENT.value,
+        "violation 0.0e+00, complementarity 0.0e+00, bi-active pairs: 1",
+        "slope of the objective along the direction: -2",
+        "  y +1",
+    ]
+    assert certified.splitlines()[0] == Stationarity.B.value and len(certified.splitlines()) == 2
+
+
+def test_a_certificate_prints_only_so_many_entries():
+    m = pyo.ConcreteModel()
+    m.x = pyo.Var(range(9), bounds=(0, None), initialize=lambda m, i: i + 1)
+    m.total = pyo.Objective(expr=pyo.quicksum(m.x.values()))
+    lines = str(pyomo_fesd.certify(m)).splitlines()
+    assert len(lines) == 3 + SHOWN + 1 and lines[-1] == "  and 3 others"
 
 
 @pytest.mark.parametrize('x, y', [(1.0, 0.0), (0.0, 1.0)])
