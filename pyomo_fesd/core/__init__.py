@@ -64,6 +64,7 @@ from pyomo_fesd.core.moving_grid import MovingGrid, Split, add_moving_grid, movi
 from pyomo_fesd.core.node_search import contains_node, leaves_of
 from pyomo_fesd.core.own_data import data_of, declared, own_blocks, own_components, own_data, variables_below
 from pyomo_fesd.core.parts import Part
+from pyomo_fesd.core.paused_collection import paused_collection
 from pyomo_fesd.core.phase import phase
 from pyomo_fesd.core.positive_part import add_part_of_number, add_positive_part, declare_positive_part
 from pyomo_fesd.core.private_data import records_below, remember_records

@@ -5,13 +5,12 @@ from contextlib import ExitStack
 
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentSet
-from pyomo.common.gc_manager import PauseGC
 from pyomo.core import Block
 from pyomo.core.base.block import BlockData
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunction
 
-from pyomo_fesd.core import FesdError, TimeIndex, TimeWriter, discretised, switched_systems
+from pyomo_fesd.core import FesdError, TimeIndex, TimeWriter, discretised, paused_collection, switched_systems
 from pyomo_fesd.dcs.blending import blend, dcs_block
 from pyomo_fesd.dcs.exclusion_pairs import write_exclusions
 from pyomo_fesd.dcs.forms import heaviside, hysteresis, stewart
@@ -65,7 +64,7 @@ class DcsWriter(TimeWriter):
         # where time is not discretised yet, the same Disjunctions follow at further times
         analyses, self._analyses = self._analyses or Analyses(), None
         reader = SystemReader(TimeVariables(model, self.wrt, self.defines), times, analyses)
-        with PauseGC(), ExitStack() as undo:
+        with paused_collection(), ExitStack() as undo:
             PiecewiseRewriter(self.block, times, undo).replace_all([*_blocks(self.targets), *self._disjuncts(found)])
             trees = [nesting.tree(d) for d in found]
             propositions = read_logic(_blocks(self.targets), trees, times)

@@ -9,7 +9,6 @@ So do Disjuncts that hold nothing that pyomo.dae would expand, as most do: it wo
 from collections.abc import Sequence
 from contextlib import contextmanager
 
-from pyomo.common.gc_manager import PauseGC
 from pyomo.core import (
     Block,
     BooleanVar,
@@ -39,6 +38,7 @@ from pyomo_fesd.core import (
     is_indexed_by,
     label_decimals,
     own_components,
+    paused_collection,
     restored_on_error,
     withheld_messages,
 )
@@ -79,7 +79,7 @@ def discretise(block: Block, wrt: ContinuousSet, shares: list[int], ncp: int, sc
         times only
     """
     _refuse_unexpandable(block, wrt)
-    with restored_on_error(block, wrt), PauseGC():
+    with restored_on_error(block, wrt), paused_collection():
         inputs = read_fixed_inputs(block, wrt, controls)
         decimals = label_decimals(wrt, shares, ncp)
         place_boundaries(wrt, shares, decimals)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from pyomo.common.collections import ComponentSet
 from pyomo.common.config import document_class_CONFIG
-from pyomo.common.gc_manager import PauseGC
 from pyomo.common.modeling import unique_component_name
 from pyomo.core import Block, Transformation, Var
 from pyomo.gdp import Disjunct, Disjunction
@@ -26,6 +25,7 @@ from pyomo_fesd.core import (
     label_decimals,
     moving_grids,
     own_components,
+    paused_collection,
     read_grid,
     read_keywords,
     restored_on_error,
@@ -149,7 +149,7 @@ def _laid(instance, config):
     wrt = find_continuous_set(instance, config.wrt, 'fesd.finite_elements')
     instance = _common_block(instance, wrt)
     _check_keywords(instance, wrt, config)
-    with TRANSFORMATION, restored_on_error(instance, wrt), PauseGC():
+    with TRANSFORMATION, restored_on_error(instance, wrt), paused_collection():
         present = discretised(wrt)
         moving = _add_grid(instance, wrt, config)
         integrals = _rebuild_integrals(instance, moving)

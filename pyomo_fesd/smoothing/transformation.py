@@ -3,7 +3,6 @@
 import logging
 
 from pyomo.common.config import Bool, ConfigDict, ConfigValue, NonNegativeFloat, document_class_CONFIG
-from pyomo.common.gc_manager import PauseGC
 from pyomo.core import Transformation
 from pyomo.core.base.block import BlockData
 from pyomo.core.util import target_list
@@ -17,6 +16,7 @@ from pyomo_fesd.core import (
     continuous_sets,
     find_continuous_set,
     moving_grids,
+    paused_collection,
     read_keywords,
     restored_on_error,
 )
@@ -127,7 +127,7 @@ class _SmoothingWriter(TimeWriter):
 
 def _replace_absolute_values(instance, targets, choice):
     """Replace every absolute value of the targets; returns a ``Summary``."""
-    with PauseGC():
+    with paused_collection():
         survey = Survey(sources(instance, targets), **choice)
         reasons = [(s, [survey.reason(s, *m) for m in matches]) for s, matches in survey.matches.items()]
         _refuse_moving_elements(s for s, found in reasons if None in found)
