@@ -74,6 +74,7 @@ from pyomo_fesd.core.smallest import add_smallest, declare_smallest
 from pyomo_fesd.core.stamp import Stamp
 from pyomo_fesd.core.step import add_step, declare_step
 from pyomo_fesd.core.structural_key import StructuralKey, any_number, exactly, nine_digits, variables_of
+from pyomo_fesd.core.sums import product_of, sum_of, weighted_sum
 from pyomo_fesd.core.switched_systems import (
     Contact,
     Dependents,
@@ -92,6 +93,7 @@ from pyomo_fesd.core.switched_systems import (
     write_at_further_times,
 )
 from pyomo_fesd.core.time_index import (
+    DISCRETISATION,
     TimeIndex,
     ancestry,
     continuous_sets,

@@ -24,16 +24,16 @@ def contains_node(expr, sought: frozenset, enter=None) -> bool:
     enter : function ExpressionData -> bool, optional
         whether to search in this named Expression.  Default: a named Expression counts as found.
     """
-    sorts, waiting = _sorts(sought), [expr]
+    sorts, waiting = _sorts(sought), [(expr,)]
     while waiting:
-        node = waiting.pop()
-        sort = sorts[node.__class__]
-        if sort is _LEAF:
-            continue
-        if sort is _SOUGHT or (sort is _NAMED and enter is None):
-            return True
-        if sort is _OPERATION or enter(node):
-            waiting.extend(node.args)
+        for node in waiting.pop():
+            sort = sorts[node.__class__]
+            if sort is _LEAF:
+                continue
+            if sort is _SOUGHT or (sort is _NAMED and enter is None):
+                return True
+            if sort is _OPERATION or enter(node):
+                waiting.append(node.args)
     return False
 
 

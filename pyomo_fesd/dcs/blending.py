@@ -13,7 +13,7 @@ from weakref import ref
 from pyomo.core import Block, Constraint, Set, Var
 from pyomo.core.base.block import BlockData
 
-from pyomo_fesd.core import GENERATED, exchanged, index_tuple, insert, switched_systems
+from pyomo_fesd.core import GENERATED, exchanged, index_tuple, insert, sum_of, switched_systems
 from pyomo_fesd.dcs.continuation import Continuation
 from pyomo_fesd.dcs.forms import heaviside
 from pyomo_fesd.dcs.reading import split
@@ -124,7 +124,7 @@ def _add_blended_equations(block, index, system, weight, continuation):
             expr = rhs[0][j]
         else:
             terms = _terms(system, j, rhs, implicit, continuation)
-            expr = sum(weight(modes) * f for modes, f in terms if not _is_zero(f))
+            expr = sum_of([weight(modes) * f for modes, f in terms if not _is_zero(f)])
         sources = list(chain(*(used[j] for used in equations.used)))
         _record_sources(maps, insert(block.mode, (*index, j + 1), v == expr), system, sources)
 

@@ -65,11 +65,15 @@ class DcsWriter(TimeWriter):
         analyses, self._analyses = self._analyses or Analyses(), None
         reader = SystemReader(TimeVariables(model, self.wrt, self.defines), times, analyses)
         with paused_collection(), ExitStack() as undo:
-            PiecewiseRewriter(self.block, times, undo).replace_all([*_blocks(self.targets), *self._disjuncts(found)])
             trees = [nesting.tree(d) for d in found]
             propositions = read_logic(_blocks(self.targets), trees, times)
             modes = modes_left(trees, propositions)
-            systems = [_read_system(reader, tree, modes[tree], tree.disjunction in with_hysteresis) for tree in trees]
+            known = {tree: reader.recognise(tree, modes[tree]) for tree in trees if tree.disjunction not in with_hysteresis}
+            rewriter = PiecewiseRewriter(self.block, times, undo)
+            rewriter.replace_all([*_blocks(self.targets), *self._disjuncts(found)], _disjuncts_of(known))
+            systems = [
+                known.get(tree) or _read_system(reader, tree, modes[tree], tree.disjunction in with_hysteresis) for tree in trees
+            ]
             refuse_twice_defined(systems, defined)
             exclusions = read_exclusions(propositions, systems)
             forms = [_form(self.form, system) for system in systems]
@@ -106,6 +110,12 @@ def _blocks(targets):
     for target in targets:
         if target.ctype is Block:
             yield from target.values() if not isinstance(target, BlockData) else [target]
+
+
+def _disjuncts_of(systems):
+    """The disjuncts of the systems that were recognised, by id."""
+    modes = (mode for system in systems.values() if system is not None for mode in system.modes)
+    return {id(disjunct): disjunct for mode in modes for disjunct in mode.disjuncts}
 
 
 def _read_system(reader, tree, modes, with_hysteresis):

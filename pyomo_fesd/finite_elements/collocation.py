@@ -22,7 +22,7 @@ from pyomo.dae.misc import generate_finite_elements
 from pyomo.dae.plugins.colloc import Collocation_Discretization_Transformation
 from scipy.special import roots_jacobi, roots_legendre
 
-from pyomo_fesd.core import stored_index
+from pyomo_fesd.core import stored_index, weighted_sum
 
 
 @cache
@@ -136,7 +136,7 @@ class _Scheme:
         """The sum; pyomo.dae takes an IndexError for a label without an equation."""
         if label not in self._terms:
             raise IndexError(label)
-        return sum(f(t) * weight for t, weight in self._terms[label])
+        return weighted_sum([(weight, f(t)) for t, weight in self._terms[label]])
 
 
 def _differences(tau):

@@ -21,7 +21,7 @@ import numpy as np
 from pyomo.core import Constraint, Expression, quicksum
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import BranchConstraint, MovingGrid, homotopy_hints, insert, interpolation_weights
+from pyomo_fesd.core import BranchConstraint, MovingGrid, homotopy_hints, insert, interpolation_weights, weighted_sum
 from pyomo_fesd.finite_elements.equilibration import TINY
 
 #: H'(0), relative to the sum of its terms' sizes, below which H leaves zero without a slope.
@@ -67,7 +67,8 @@ def _add_exit_condition(block, condition, e, f, slope, end):
 
 def _relative_slope(weights, values):
     """sum_j w_j f_j in relation to sum_j |w_j| f_j."""
-    return quicksum(w * f for w, f in zip(weights, values)) / (quicksum(abs(w) * f for w, f in zip(weights, values)) + TINY)
+    sizes = map(abs, weights)
+    return weighted_sum(list(zip(weights, values))) / (weighted_sum(list(zip(sizes, values))) + TINY)
 
 
 def _positive(expr):

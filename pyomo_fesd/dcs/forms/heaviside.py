@@ -14,12 +14,11 @@ Does not apply: where the weights would not sum up to 1 at some point at which s
 """
 
 from collections.abc import Iterable
-from math import prod
 
 from pyomo.core import RangeSet
 from pyomo.core.base.block import BlockData
 
-from pyomo_fesd.core import add_step, declare_step, stored_index
+from pyomo_fesd.core import add_step, declare_step, product_of, stored_index, sum_of
 from pyomo_fesd.dcs.reading import ModeSystem, not_covered_once
 
 NAME = 'heaviside'
@@ -71,7 +70,7 @@ def weight(block: BlockData, index: tuple, system: ModeSystem, modes):
     implicants = system.regions.geometry.implicants
     alpha = [block.alpha[stored_index(key)] for key in _indices(block, index)]
     rows = implicants.weighing(frozenset(modes), len(system.modes))
-    return sum(prod(a if sign > 0 else 1 - a for a, sign in zip(alpha, row) if sign) for row in rows)
+    return sum_of([product_of([a if sign > 0 else 1 - a for a, sign in zip(alpha, row) if sign]) for row in rows])
 
 
 def owners(block: BlockData, index: tuple, system: ModeSystem) -> Iterable:

@@ -24,11 +24,12 @@ from pyomo.mpec import Complementarity
 from pyomo.mpec.complementarity import ComplementarityData
 
 from pyomo_fesd.core import (
+    DISCRETISATION,
     GENERATED,
     FesdError,
     contains_node,
+    declared,
     discretised,
-    is_discretisation_equation,
     is_generated,
     own_data,
 )
@@ -67,11 +68,11 @@ class PiecewiseRewriter:
     def _enters(self, named):
         return not self.waits(named)
 
-    def replace_all(self, blocks) -> None:
-        """Replace everything below ``blocks``."""
+    def replace_all(self, blocks, without=()) -> None:
+        """Replace everything below ``blocks``; the Constraints of those whose ids are in ``without`` contain no functions."""
         for block in blocks:
             _refuse_written_by_pyomo(block, self._times)
-            found = _Survey(block, self._times)
+            found = _Survey(block, self._times, without)
             for source in found.piecewise:
                 relation = univariate.relation(source, RewriteContext(self._shared, source, self._times.time(source)))
                 replace_constraint(source, relation, self._undo)
@@ -132,6 +133,7 @@ WRITERS = {
     Complementarity: PiecewiseRewriter.write_complementarity,
 }
 SOUGHT = frozenset(WRITERS) | {PiecewiseLinearFunction}
+SOUGHT_BESIDE = SOUGHT - {Constraint}
 
 
 def _refuse_written_by_pyomo(block, times):
@@ -165,19 +167,17 @@ class _Survey:
     functions : list of active PiecewiseLinearFunctions
     """
 
-    def __init__(self, block, times):
+    def __init__(self, block, times, without):
         self.piecewise, self.functions, sources = [], [], {}
         for place in block.block_data_objects(active=True, descend_into=EVERYWHERE):
             if univariate.is_piecewise(place) and times.time(place) is not None:
                 self.piecewise.append(place)
                 continue
             generated = is_generated(place)
-            # to ask Pyomo for the components of several types takes longer than to look at all
-            for component in place.component_map().values():
-                ctype = component.ctype
-                if ctype not in SOUGHT or not component.active:
+            for component in declared(place, SOUGHT_BESIDE if id(place) in without else SOUGHT):
+                if not component.active:
                     continue
-                if ctype is PiecewiseLinearFunction:
+                if component.ctype is PiecewiseLinearFunction:
                     self.functions += _active(component)
                 elif not generated and not _is_ours(component):
                     for data in _active(component):
@@ -194,7 +194,8 @@ def _active(component):
 
 def _is_ours(component):
     """Whether pyomo.dae or this package has written a component beside those of the user."""
-    return component.local_name.startswith(GENERATED) or is_discretisation_equation(component)
+    name = component.local_name
+    return name.startswith(GENERATED) or name.endswith(DISCRETISATION)
 
 
 def _complementarity_sides(condition):

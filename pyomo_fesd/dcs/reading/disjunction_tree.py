@@ -20,7 +20,9 @@ from pyomo.common.collections import ComponentMap, ComponentSet
 from pyomo.core import Block, Constraint
 from pyomo.gdp import Disjunct, Disjunction
 
-from pyomo_fesd.core import FesdError, data_of, own_data
+from pyomo_fesd.core import FesdError, data_of, declared, own_data
+
+CONSTRAINTS = {Constraint}
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +80,7 @@ def active_constraints(disjunct) -> list:
     if Block in disjunct._ctypes:
         return list(disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
     # most disjuncts hold a few Constraints, and there is one at every time: Pyomo's walk takes longer than all the rest
-    components = disjunct.component_map(Constraint, active=True).values()
-    return [data for component in components for data in data_of(component) if data.active]
+    return [data for c in declared(disjunct, CONSTRAINTS) if c.active for data in data_of(c) if data.active]
 
 
 def enclosing_disjunct(component):

@@ -9,10 +9,10 @@ from pyomo.dae import DerivativeVar
 from pyomo.gdp import Disjunct
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import FesdError, variables_that_count
+from pyomo_fesd.core import FesdError, declared, variables_that_count
 
 #: Types of the components of most disjuncts; one Var is the binary of the indicator.
-PLAIN = {BooleanVar, Var, Constraint}
+PLAIN, VARIABLES = {BooleanVar, Var, Constraint}, {Var}
 #: Components that a disjunct over time cannot contain (a Disjunct only if it belongs to another tree): cause and fix.
 REFUSED_INSIDE = {
     Disjunct: (
@@ -40,7 +40,7 @@ def _other_components(disjunct):
     ctypes = disjunct._ctypes
     if Block in ctypes:
         return disjunct.component_objects(descend_into=Block)
-    plain = ctypes.keys() <= PLAIN and len(disjunct.component_map(Var)) == 1
+    plain = ctypes.keys() <= PLAIN and len(declared(disjunct, VARIABLES)) == 1
     return () if plain else disjunct.component_map().values()
 
 

@@ -1,9 +1,10 @@
 """Read one Disjunction at one time: its modes, its regions, and the variables that the modes define."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain
+from typing import NamedTuple
 
-from pyomo.common.collections import ComponentSet
 from pyomo.core.expr.visitor import identify_variables
 
 from pyomo_fesd.core import Stamp, expression_key, refuse_foreign
@@ -65,6 +66,15 @@ class HysteresisSystem(ModeSystem):
     conditions: list
 
 
+class _Stated(NamedTuple):
+    """The constraints of each mode; a key of them all together, if there is one, and its components."""
+
+    equalities: list
+    inequalities: list
+    key: tuple | None = None
+    parts: Sequence = ()
+
+
 @dataclass(frozen=True)
 class Analyses:
     """The analyses of Disjunctions, which hold for all that are built alike.
@@ -93,36 +103,58 @@ class SystemReader:
     """
 
     def __init__(self, variables, times, analyses):
-        self._variables, self._times, self._own = variables, times, ComponentSet()
+        # the components of the model by id, which are kept, so that no other one gets it
+        self._variables, self._times, self._own = variables, times, {}
         self._patterns, self._choices, self._read = analyses.patterns, analyses.choices, analyses.systems
+
+    def recognise(self, tree, modes) -> ModeSystem | None:
+        """Return the ``modes`` that are left of a tree where others that are built alike were read before, else None.
+
+        These contain no operations that ``expression_key`` does not know, such as piecewise functions.
+        """
+        if len(modes) == 1 or not self._read:
+            return None
+        stated = self._stated(modes)
+        first, stamp = self._read.get(stated.key, (None, None))
+        if first is None:
+            return None
+        refuse_contents(tree, modes)
+        self._refuse_foreign(tree, modes, stated)
+        regions = Regions([stamp.expression(c, stated.parts) for c in first.regions.functions], first.regions.geometry)
+        equations = first.equations.stamped(stamp, stated.parts, stated.equalities)
+        return ModeSystem(tree, modes, regions, equations, first.laws)
 
     def read(self, tree, modes) -> ModeSystem:
         """Read the ``modes`` that are left of a tree; the model is not changed."""
+        known = self.recognise(tree, modes)
+        if known is not None:
+            return known
         refuse_contents(tree, modes)
         if len(modes) == 1:
             return ModeSystem(tree, modes, None, None, [])
+        stated = self._stated(modes)
+        self._refuse_foreign(tree, modes, stated)
+        system = self._study(tree, modes, stated.equalities, stated.inequalities)
+        # regions alone are right at the first time only
+        if stated.key is not None and any(stated.equalities):
+            self._read[stated.key] = system, Stamp(stated.parts)
+        return system
+
+    def _stated(self, modes):
+        """The constraints of some modes, with a key of them all together."""
         equalities, inequalities = _split_constraints(modes)
         counts = tuple(map(len, equalities)), tuple(map(len, inequalities))
         key, parts = expression_key(
             [con.expr for con in chain(*equalities, *inequalities)],
             lambda v: (*self._variables.kind(v), v.lb, v.ub),
         )
-        self._refuse_foreign(tree, modes, [*equalities, *inequalities], parts)
-        first, stamp = self._read.get((counts, key), (None, None))
-        if first is not None:
-            regions = Regions([stamp.expression(c, parts) for c in first.regions.functions], first.regions.geometry)
-            return ModeSystem(tree, modes, regions, first.equations.stamped(stamp, parts, equalities), first.laws)
-        system = self._study(tree, modes, equalities, inequalities)
-        # regions alone are right at the first time only
-        if key is not None and any(equalities):
-            self._read[counts, key] = system, Stamp(parts)
-        return system
+        return _Stated(equalities, inequalities, None if key is None else (counts, key), parts)
 
     def read_hysteresis(self, tree, modes) -> HysteresisSystem:
         """Read two or more modes whose regions may overlap, leave gaps, or have no condition."""
         refuse_contents(tree, modes)
         equalities, inequalities = _split_constraints(modes)
-        self._refuse_foreign(tree, modes, [*equalities, *inequalities])
+        self._refuse_foreign(tree, modes, _Stated(equalities, inequalities))
         equations = self._equations(tree.disjunction, modes, equalities, inequalities)
         stated = [[c for con in cons for c in conditions(con)] for cons in inequalities]
         refuse_defined_in_regions(tree.disjunction, chain(*stated), equations)
@@ -144,13 +176,13 @@ class SystemReader:
         choice = self._choices.setdefault(self._times.split(disjunction)[1], {})
         return read_equations(disjunction, modes, equalities, self._variables, choice)
 
-    def _refuse_foreign(self, tree, modes, constraints, parts=()):
-        """Refuse variables of another model; ``parts`` are all components of the constraints, if they are known."""
+    def _refuse_foreign(self, tree, modes, stated):
+        """Refuse variables of another model."""
         # units of measure are among the parts, and belong to no model
-        components = ComponentSet(part.parent_component() for part in parts if hasattr(part, 'parent_component'))
-        if components and components <= self._own:
+        components = {id(c): c for c in (part.parent_component() for part in stated.parts if hasattr(part, 'parent_component'))}
+        if components and components.keys() <= self._own.keys():
             return
-        for mode, cons in zip([*modes, *modes], constraints):
+        for mode, cons in zip([*modes, *modes], [*stated.equalities, *stated.inequalities]):
             mentioned = (v for con in cons for v in identify_variables(con.body))
             refuse_foreign(mentioned, tree.disjunction.model(), mode)
         self._own |= components
