@@ -5,7 +5,7 @@ Leaves: nothing.
 Does not apply: where the user has named components, which may be References.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 from pyomo.core import Block, Var
 from pyomo.core.base.block import BlockData
@@ -14,26 +14,19 @@ from pyomo.core.base.block import BlockData
 def own_components(block: Block, ctype, descend_into, active: bool | None = None) -> Iterator:
     """Yield the components of type ``ctype`` that are no References; the parameters and the order are those of Pyomo's walks."""
     wanted, places = (set(types) if isinstance(types, tuple) else {types} for types in (ctype, descend_into))
-    read, read_inner, met = components_reader(block, wanted, active), components_reader(block, places, active), wanted | places
-    waiting = [block] if active is None or block.active == active else []
+    met, waiting = wanted | places, [block] if active is None or block.active == active else []
     while waiting:
         place = waiting.pop()
-        yield from (c for c in read(place) if not is_reference(c))
+        yield from _of_state(declared(place, wanted), active)
         # Disjuncts are many, and most have none of the types
-        found = [b for c in read_inner(place) if not is_reference(c) for b in data_of(c) if not met.isdisjoint(b._ctypes)]
+        inner = _of_state(declared(place, places), active)
+        found = [b for c in inner for b in data_of(c) if not met.isdisjoint(b._ctypes)]
         waiting += [b for b in reversed(found) if active is None or b.active == active]
 
 
-def components_reader(block: Block, ctypes: Collection, active: bool | None = None) -> Callable:
-    """Return the function from ``block``, or one below it, to its components of some types, References among them."""
-    components = block.component_map(ctypes, active)
-
-    def read(place):
-        # Disjuncts are many: Pyomo takes longer to make a map than to read it
-        components._block = place
-        return () if ctypes.isdisjoint(place._ctypes) else components.values()
-
-    return read
+def _of_state(components, active):
+    """Those that are no References, and are active or not as wanted."""
+    return (c for c in components if not is_reference(c) and (active is None or c.active == active))
 
 
 def declared(block: Block, types: Collection) -> Iterable:

@@ -4,7 +4,7 @@ import pyomo.environ as pyo
 import pytest
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core.own_data import own_components, own_data, variables_below
+from pyomo_fesd.core.own_data import declared, own_components, own_data, variables_below
 
 
 @pytest.fixture
@@ -57,3 +57,27 @@ def test_a_reference_to_a_block_is_no_place_of_its_own(m):
     m.c = pyo.Block([1, 2], rule=lambda c, i: c.add_component('w', pyo.Var()))
     m.once_more = pyo.Reference(m.c)
     assert names(own_data(m, pyo.Var, pyo.Block))[-2:] == ['c[1].w', 'c[2].w']
+
+
+def test_declared_components_come_in_the_order_of_their_declaration(m):
+    m.c, m.last = pyo.Constraint(expr=m.x == 0), pyo.Var()
+    assert names(declared(m, {pyo.Constraint, pyo.Var})) == ['x', 'y', 'again', 'c', 'last']
+    assert names(declared(m, {pyo.Constraint})) == ['c']
+    assert names(declared(m, {Disjunct})) == []
+
+
+def test_deleted_components_are_declared_no_longer(m):
+    for name in ('x', 'again'):
+        m.del_component(name)
+    assert names(declared(m, {pyo.Var})) == ['y']
+    for name in ('y', 'b'):
+        m.del_component(name)
+    assert names(declared(m, {pyo.Var, pyo.Block})) == []
+
+
+def test_components_of_another_type_are_declared_under_it(m):
+    m.reclassify_component_type('x', pyo.Block)
+    assert names(declared(m, {pyo.Var})) == ['y', 'again']
+    assert names(declared(m, {pyo.Block})) == ['x', 'b']
+    m.reclassify_component_type('x', pyo.Var)
+    assert names(declared(m, {pyo.Var})) == ['x', 'y', 'again']

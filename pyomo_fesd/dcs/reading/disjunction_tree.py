@@ -118,14 +118,14 @@ class Nesting:
         host = self._enclosing(disjunction)
         if host is not None:
             return host
-        hosts = ComponentSet(self._enclosing(d) for d in disjunction.disjuncts)
+        hosts = {id(host): host for host in map(self._enclosing, disjunction.disjuncts)}
         if len(hosts) > 1:
             raise FesdError(
                 disjunction,
                 "its disjuncts lie in different disjuncts, or only some of them in one",
                 "declare all disjuncts of a nested Disjunction in the disjunct that it belongs to",
             )
-        return next(iter(hosts), None)
+        return next(iter(hosts.values()), None)
 
     def _enclosing(self, component):
         """The innermost disjunct over time around a component, or None."""
@@ -158,7 +158,8 @@ class Nesting:
                 raise FesdError(d, f"it is nested in '{disjunction.name}', which is of another time", "nest modes of one time")
         with_hysteresis = disjunction in self._with_hysteresis
         tree = DisjunctionTree(disjunction, nested, list(self._modes(disjunction, with_hysteresis)))
-        return tree if with_hysteresis else replace(tree, modes=_modes_fixed_to_true(tree))
+        chosen = [] if with_hysteresis else [d for d in tree.disjuncts() if d.indicator_var.fixed and d.indicator_var.value]
+        return replace(tree, modes=_modes_fixed_to_true(tree, chosen)) if chosen else tree
 
     def _below(self, disjunction):
         for disjunct in disjunction.disjuncts:
@@ -189,9 +190,8 @@ def _is_possible(disjunction, disjunct, with_hysteresis):
     return False
 
 
-def _modes_fixed_to_true(tree):
-    """The modes that contain every disjunct whose indicator is fixed to True."""
-    chosen = [d for d in tree.disjuncts() if d.indicator_var.fixed and d.indicator_var.value]
+def _modes_fixed_to_true(tree, chosen):
+    """The modes that contain every ``chosen`` disjunct, whose indicator is fixed to True."""
     modes = [mode for mode in tree.modes if all(d in mode for d in chosen)]
     if not modes:
         raise FesdError(

@@ -7,12 +7,14 @@ import pyomo.environ as pyo
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pyomo.core.expr import Expr_ifExpression
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
+from pyomo_fesd.core import contains_node
 from pyomo_fesd.core.complementarity import read_complementarity
 from tests.models import collocate, dcs, snapshot, solution
 from tests.problems.pieces import BENT, HOLDING, JUMPING, STAIRS, by_conditions, exact, states
@@ -286,6 +288,31 @@ def test_inside_a_disjunct():
     assert [s.time for s in pyomo_fesd.switches(m)] == pytest.approx([0.3, 0.55], abs=1e-9)
     (image,) = fesd_dcs.get_transformed_constraints(m.mode[0].disjuncts[0].constraint[2])
     assert fesd_dcs.get_src_constraint(image)[0] is m.mode[0].disjuncts[0].constraint[2]
+
+
+def test_inside_a_disjunct_at_some_of_the_further_times():
+    """Disjuncts that are built like known ones are not searched; those that are not, are."""
+    m = states(-2.0, 2.0, -5, 5)
+    m.z = pyo.Var(m.t)
+
+    @m.Disjunct(m.t)
+    def below(d, t):
+        m, rate = d.model(), d.model().x[t] + 3
+        d.region = pyo.Constraint(expr=m.x[t] <= 0)
+        d.z = pyo.Constraint(expr=m.z[t] == (rate if t < 1 else pyo.Expr_if(IF=m.x[t] >= -1, THEN=rate, ELSE=1 + rate)))
+
+    @m.Disjunct(m.t)
+    def above(d, t):
+        m = d.model()
+        d.region = pyo.Constraint(expr=m.x[t] >= 0)
+        d.z = pyo.Constraint(expr=m.z[t] == 1)
+
+    m.ode = pyo.Constraint(m.t, rule=lambda m, t: m.dx[t] == m.z[t])
+    m.mode = Disjunction(m.t, rule=lambda m, t: [m.below[t], m.above[t]])
+    transform(m, 4, 2)
+    rows = [c for c in m.component_data_objects(pyo.Constraint, active=True, descend_into=pyo.Block)]
+    assert not any(contains_node(c.expr, frozenset([Expr_ifExpression])) for c in rows)
+    assert {c.index()[0] for c in generated(m, pyo.Constraint)} == {t for t in m.t if t >= 1}
 
 
 # What is refused
