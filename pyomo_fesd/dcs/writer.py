@@ -68,7 +68,8 @@ class DcsWriter(TimeWriter):
             trees = [nesting.tree(d) for d in found]
             propositions = read_logic(_blocks(self.targets), trees, times)
             modes = modes_left(trees, propositions)
-            known = {tree: reader.recognise(tree, modes[tree]) for tree in trees if tree.disjunction not in with_hysteresis}
+            plain = [tree for tree in trees if tree.disjunction not in with_hysteresis and not _contains_blocks(tree)]
+            known = {tree: reader.recognise(tree, modes[tree]) for tree in plain}
             rewriter = PiecewiseRewriter(self.block, times, undo)
             rewriter.replace_all([*_blocks(self.targets), *self._disjuncts(found)], _disjuncts_of(known))
             systems = [
@@ -110,6 +111,11 @@ def _blocks(targets):
     for target in targets:
         if target.ctype is Block:
             yield from target.values() if not isinstance(target, BlockData) else [target]
+
+
+def _contains_blocks(tree):
+    """Whether a Block, which may be a Piecewise that is not replaced yet, lies in a disjunct."""
+    return any(Block in disjunct._ctypes for disjunct in tree.disjuncts())
 
 
 def _disjuncts_of(systems):
