@@ -93,7 +93,6 @@ from pyomo_fesd.core.switched_systems import (
     write_at_further_times,
 )
 from pyomo_fesd.core.time_index import (
-    DISCRETISATION,
     TimeIndex,
     ancestry,
     continuous_sets,

@@ -1,6 +1,6 @@
 """Make many objects without Python's garbage collection, and without the walk over all of them that would follow.
 
-Pyomo's ``PauseGC`` enables the collection at its end, and the next allocation starts one that walks all the new objects: 10 to 20 %
+Pyomo's ``PauseGC`` enables the collection at its end, and the next allocation starts one that walks all the new objects: a tenth
 of the time of a transformation, and nothing of a new model is garbage.  Here the new objects count as old at once: they are walked
 by the next full collection.  Python starts one by the number of objects that grew old otherwise, so models that were thrown away
 could add up in between: after ``MOST`` objects the collection is Python's own until the next full one.
@@ -10,7 +10,7 @@ import gc
 from contextlib import contextmanager
 from threading import Lock
 
-#: Fewer new objects than this are walked in a millisecond.
+#: To walk fewer new objects than this takes about a millisecond at most.
 FEW = 10_000
 #: New objects that may count as old between two full collections; one model may go beyond.
 MOST = 500_000

@@ -24,12 +24,12 @@ from pyomo.mpec import Complementarity
 from pyomo.mpec.complementarity import ComplementarityData
 
 from pyomo_fesd.core import (
-    DISCRETISATION,
     GENERATED,
     FesdError,
     contains_node,
     declared,
     discretised,
+    is_discretisation_equation,
     is_generated,
     own_data,
 )
@@ -194,8 +194,7 @@ def _active(component):
 
 def _is_ours(component):
     """Whether pyomo.dae or this package has written a component beside those of the user."""
-    name = component.local_name
-    return name.startswith(GENERATED) or name.endswith(DISCRETISATION)
+    return component.local_name.startswith(GENERATED) or is_discretisation_equation(component)
 
 
 def _complementarity_sides(condition):
