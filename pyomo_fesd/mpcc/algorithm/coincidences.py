@@ -44,24 +44,53 @@ class Coincidences:
 
     def settle(self):
         """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
-        while self.run.point is not None and self.run.point.certificate.certified and self._c.has_objective:
+        while self.run.point is not None and self._c.has_objective:
             before = self.run.point
+            if not before.certificate.certified:
+                if before.certificate.grade is not Stationarity.LIMITED or not self._leads_on(before):
+                    return
+                continue
             # until all orders are settled any certified point is better
             self.run.point = replace(before, certificate=replace(before.certificate, grade=Stationarity.OPEN))
             found = self._outcome(before)
-            other = self._branches.with_fewer_short(before) if found is OPEN else None
-            if other is not None:
-                self.run.point = other
+            if found is OPEN and self._takes_fewer_short(before):
                 continue
             if found is SETTLED:
                 self.run.point = self._settled = before
             elif found is not OPEN:
-                self._branches.improve_from(found, True)
-                if not self.run.point.certificate.certified:
-                    # a better point may have changes that leave at the other end, or beside a place at its lower bound
-                    self._branches.try_neighbours()
+                self._go_on(found)
             if found in (SETTLED, OPEN):
                 return
+
+    def _go_on(self, found):
+        """Descend from a better point in another order."""
+        self._branches.improve_from(found, True)
+        if not self.run.point.certificate.certified:
+            # it may have changes that leave at the other end, or beside a place at its lower bound
+            self._branches.try_neighbours()
+
+    def _leads_on(self, point):
+        """Whether there is a point to go on from, where only places of least extent keep the incumbent from descending.
+
+        Such a place is to be passed by: the change beside it would happen earlier, or later.
+        """
+        sets, tried = self._subsolves.sets(point.w, self._tolerances.biactive), set()
+        for order in self._orders.at(point, sets):
+            if order.key in tried:
+                continue
+            tried.add(order.key)
+            found = next((better for better in (self._grown(point, way) for way in order.ways) if better is not None), None)
+            if found is not None:
+                self._go_on(found)
+                return True
+        return self._takes_fewer_short(point)
+
+    def _takes_fewer_short(self, point):
+        """Whether there is a point with fewer places of least extent, which is the incumbent now."""
+        other = self._branches.with_fewer_short(point)
+        if other is not None:
+            self.run.point = other
+        return other is not None
 
     def mark_untried(self):
         """Mark the incumbent as open if it is certified, and has orders that were not tried as a limit came before."""
@@ -163,9 +192,22 @@ class Coincidences:
 
         ``inserts`` is whether places can be inserted, so that their values have a limit.
         """
+        grown = self._grown(point, way) if inserts else None
+        if grown is not None:
+            return grown
         with self._c.vanishing(way.extents):
             found = self._without_extent(point, inserts, way)
         return found if isinstance(found, str) else self._better(point, *found)
+
+    def _grown(self, point, way):
+        """A better point in the branch of a way, from its places as they are; or None.
+
+        Where places have no extent, what they hold is not determined, and an NLP with them at 0 may not end at all.
+        """
+        start = way.start.copy()
+        start[way.extents] = point.w[way.extents]
+        found = self._better(point, (start,), way.zero)
+        return None if found is OPEN else found
 
     def _without_extent(self, point, inserts, way):
         """The outcome of a way whose places have no extent; or starts and zero sides of a branch that may be better."""

@@ -59,7 +59,17 @@ class OrdersByInsertion:
         if way is None or not way.between or len(way.extents) != len(SIDES):
             return Verdict.NONE
         found = [self._beside_boundary(way, extent, ahead) for extent, ahead in zip(way.extents, SIDES)]
-        return next((verdict for verdict in (Verdict.IMPOSSIBLE, Verdict.UNKNOWN) if verdict in found), Verdict.NONE)
+        worst = next((verdict for verdict in (Verdict.IMPOSSIBLE, Verdict.UNKNOWN) if verdict in found), Verdict.NONE)
+        return self._on_both_sides(way) if worst is Verdict.UNKNOWN and Verdict.NONE not in found else worst
+
+    def _on_both_sides(self, way):
+        """The verdict of such a change in a place on each side, one after the other."""
+        places = [(self._parts.by_extent[extent], ahead) for extent, ahead in zip(way.extents, SIDES)]
+        row, unchanged = (
+            tuple(Insertion(k, ahead, zero, self._sets.zero, (k, *self._parts.beside(k))) for k, ahead in places)
+            for zero in (way.zero, self._sets.zero)
+        )
+        return self._subsolves.insertion(self._point, self._sets, row, unchanged)
 
     def _beside_boundary(self, way, extent, ahead):
         """The verdict of the place on one side of such an end, by its values alone."""
