@@ -4,7 +4,6 @@ The best point so far is ``Run.point``: an exactly complementary solution of its
 """
 
 from collections import Counter, deque
-from itertools import chain
 
 import numpy as np
 
@@ -165,15 +164,21 @@ class Branches:
         Orders of changes beside a place of least extent may not be known.  The others are not evenly distributed beside it, and the
         objective has the error of that: the point counts if it is as good but for ``UNEVEN``.  Each branch is tried once.
         """
-        number, enough = self.neighbours.number_of_short(point.w), point.f + UNEVEN * max(1.0, abs(point.f))
-        together = (self.neighbours.zero_sides(point, *some) for some in self.neighbours.without_all_short(point))
-        for zero in chain(together, self.neighbours.beside_short(point)):
-            if zero is None or zero.tobytes() in self._left_out:
+        return self._with_fewer_short(point, point.f + UNEVEN * max(1.0, abs(point.f)))
+
+    def _with_fewer_short(self, point, enough):
+        number = self.neighbours.number_of_short(point.w)
+        for zero in self.neighbours.with_fewer_short(point):
+            if zero.tobytes() in self._left_out:
                 continue
             self._left_out.add(zero.tobytes())
-            found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=enough, enough=enough)
-            if found is not None and found.certificate.certified and self.neighbours.number_of_short(found.w) < number:
-                return found
+            end = self.improve_from(self.solutions.certified(point.w, zero, max_iter=SECOND, below=enough, enough=enough), True)
+            if end is None or self.neighbours.number_of_short(end.w) >= number:
+                continue
+            if end.certificate.grade is Stationarity.LIMITED:
+                end = self._with_fewer_short(end, enough)
+            if end is not None and end.certificate.certified:
+                return end
         return None
 
     def _beside_short(self, point, enough):

@@ -86,11 +86,11 @@ class Coincidences:
         return self._takes_fewer_short(point)
 
     def _takes_fewer_short(self, point):
-        """Whether there is a point with fewer places of least extent, which is the incumbent now."""
-        other = self._branches.with_fewer_short(point)
+        """Whether there is a point with fewer places of least extent, or a better one on the way, which is the incumbent now."""
+        before, other = self.run.point, self._branches.with_fewer_short(point)
         if other is not None:
             self.run.point = other
-        return other is not None
+        return self.run.point is not before
 
     def mark_untried(self):
         """Mark the incumbent as open if it is certified, and has orders that were not tried as a limit came before."""

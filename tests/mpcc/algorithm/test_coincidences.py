@@ -31,4 +31,7 @@ def test_another_solution_with_a_spare_place_is_gone_on_from_if_it_is_better(gai
     monkeypatch.setattr(coincidences, '_beside', lambda point, way: (point.nlp, None))
     monkeypatch.setattr(coincidences, '_is_another', lambda point, other: True)
     monkeypatch.setattr(p.branches.solutions, 'certified', certified)
-    assert coincidences._try(point, True, way) is (found if better else OPEN) and seen == [True]
+    assert coincidences._try(point, False, way) is (found if better else OPEN) and seen == [True]
+    # with places that can be inserted the branch is tried before, from the point as it is
+    del seen[:]
+    assert coincidences._try(point, True, way) is (found if better else OPEN) and seen == [True] * (1 if better else 2)
