@@ -93,28 +93,42 @@ class ModelDerivatives:
     def __init__(self, functions, n, parameters, m, inner):
         sizes = ('w', n), ('p', parameters), ('of_cost', 2), ('of_g', m), ('of_z', inner)
         self._parts, self._symbols = (functions.cost, functions.rows, functions.sides), [functions.kind.sym(*one) for one in sizes]
-        at = self._symbols[:2]
-        self._values = ca.Function('values', at, [rows.values(*at) for rows in self._parts])
-        self._slopes = ca.Function('slopes', at, [rows.jacobian(*at) for rows in self._parts])
+
+    # a function for each part: an NLP's gradient needs no row, and where sides are linear its Hessian evaluates none of them
 
     @cached_property
-    def _hessian(self):
-        # a certificate needs none
-        w, p, *factors = self._symbols
-        curvatures = [rows.hessian(w, p, some) for rows, some in zip(self._parts, factors)]
-        return ca.Function('hessian', self._symbols, [sum(curvatures[1:], curvatures[0])])
+    def _values(self):
+        at = self._symbols[:2]
+        return [ca.Function('values', at, [rows.values(*at)]) for rows in self._parts]
+
+    @cached_property
+    def _slopes(self):
+        at = self._symbols[:2]
+        return [ca.Function('slopes', at, [rows.jacobian(*at)]) for rows in self._parts]
+
+    @cached_property
+    def _curvatures(self):
+        """The Hessians of the parts that are not linear, None for the others."""
+        (w, p), factors = self._symbols[:2], self._symbols[2:]
+        functions = (
+            None if rows.functions.is_linear else ca.Function('curvatures', [w, p, some], [rows.hessian(w, p, some)])
+            for rows, some in zip(self._parts, factors)
+        )
+        return list(functions)
 
     def values(self, w, p) -> list:
         """Return (f, penalty), g and (G, H, equal) at expressions."""
-        return self._values.call([w, p])
+        return [function.call([w, p])[0] for function in self._values]
 
     def slopes(self, w, p) -> list:
         """Return their Jacobians by w."""
-        return self._slopes.call([w, p])
+        return [function.call([w, p])[0] for function in self._slopes]
 
     def hessian(self, w, p, of_cost, of_g, of_z):
         """Return the upper triangle of the Hessian by w of the functions with these factors."""
-        return self._hessian.call([w, p, of_cost, of_g, of_z])[0]
+        both = zip(self._curvatures, (of_cost, of_g, of_z))
+        nothing = type(w)(w.numel(), w.numel())
+        return sum((function.call([w, p, factors])[0] for function, factors in both if function is not None), nothing)
 
 
 def composed(c, outer: Outer) -> Nlp:

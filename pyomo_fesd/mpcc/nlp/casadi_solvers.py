@@ -242,10 +242,14 @@ class CasadiUno(_CasadiNlp):
 
 
 def _functions(x, p, f, g, d):
-    """casadi's options for derivatives."""
+    """casadi's options for derivatives.
+
+    Ipopt asks these functions for derivatives only, but casadi would evaluate the values in their signatures all the same.
+    """
+    no_f, no_g = type(x)(1, 1), type(x)(g.numel(), 1)
     return {
-        'grad_f': ca.Function('nlp_grad_f', [x, p], [f, ca.densify(d.gradient)], ['x', 'p'], ['f', 'grad_f_x']),
-        'jac_g': ca.Function('nlp_jac_g', [x, p], [g, d.jacobian], ['x', 'p'], ['g', 'jac_g_x']),
+        'grad_f': ca.Function('nlp_grad_f', [x, p], [no_f, ca.densify(d.gradient)], ['x', 'p'], ['f', 'grad_f_x']),
+        'jac_g': ca.Function('nlp_jac_g', [x, p], [no_g, d.jacobian], ['x', 'p'], ['g', 'jac_g_x']),
         'hess_lag': ca.Function(
             'nlp_hess_l', [x, p, d.lam_f, d.lam_g], [d.hessian], ['x', 'p', 'lam_f', 'lam_g'], ['triu_hess_gamma_x_x']
         ),
