@@ -57,8 +57,8 @@ class Outer:
         return {name: _at(piece, inputs, values) for name, piece in pieces.items()}
 
     def inserted(self, z) -> list:
-        """Return ``weight``, ``cost`` and ``rows`` at expressions (SX) of the inner functions."""
-        pieces = [ca.SX(self.weight), ca.SX(self.cost), self.rows]
+        """Return ``weight``, ``cost``, ``rows`` and the Jacobian of the rows by (z, s) at expressions (SX) of the inner functions."""
+        pieces = [ca.SX(self.weight), ca.SX(self.cost), self.rows, ca.jacobian(self.rows, ca.vertcat(self.z, self.s))]
         return ca.substitute(pieces, [self.z], [z]) if z.numel() else pieces
 
 
@@ -73,11 +73,11 @@ class Nlp:
     derivatives: Derivatives
 
 
-def automatic(x: ca.SX, f: ca.SX, g: ca.SX) -> Derivatives:
-    """Derivatives that casadi finds for one NLP by itself."""
+def automatic(x: ca.SX, f: ca.SX, g: ca.SX, jacobian: ca.SX = None) -> Derivatives:
+    """Derivatives that casadi finds for one NLP by itself, if not even the ``jacobian`` of g is known."""
     lam_f, lam_g = ca.SX.sym('lam_f'), ca.SX.sym('lam_g', g.numel())
     hessian = ca.hessian(lam_f * f + _dot(lam_g, g), x)[0]
-    return Derivatives(ca.gradient(f, x), ca.jacobian(g, x), ca.triu(hessian), lam_f, lam_g)
+    return Derivatives(ca.gradient(f, x), ca.jacobian(g, x) if jacobian is None else jacobian, ca.triu(hessian), lam_f, lam_g)
 
 
 class ModelDerivatives:
@@ -143,10 +143,17 @@ def composed(c, outer: Outer) -> Nlp:
 
 
 def _inserted(c, outer):
-    """The ``Nlp`` of a short model: casadi derives its expressions in less time than the chain rule's matrices take to make."""
-    weight, cost, rows = outer.inserted(ca.vertcat(c.G, c.H, c.equal))
+    """The ``Nlp`` of a short model: casadi derives its expressions in less time than the chain rule's matrices take to make.
+
+    The Jacobian alone is made of the model's: casadi needs a pass for every column of a row that contains all of them, or for every
+    row of such a column, as that of a slack.
+    """
+    weight, cost, rows, slopes = outer.inserted(ca.vertcat(c.G, c.H, c.equal))
     x, f, g = ca.vertcat(c.x, outer.s), c.f + weight * c.penalty + cost, ca.vertcat(c.g, rows)
-    return Nlp(x, ca.vertcat(outer.parameter, c.p), f, g, automatic(x, f, g))
+    m, ns, J = len(c.lbg), outer.s.numel(), c.jacobian
+    chain = ca.diagcat(J[m:, :], ca.SX.eye(ns))
+    jacobian = ca.vertcat(ca.horzcat(J[:m, :], ca.SX(m, ns)), ca.mtimes(slopes, chain))
+    return Nlp(x, ca.vertcat(outer.parameter, c.p), f, g, automatic(x, f, g, jacobian))
 
 
 def _by_chain_rule(c, outer):
