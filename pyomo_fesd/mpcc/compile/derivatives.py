@@ -50,14 +50,15 @@ class Outer:
             'rows': self.rows,
             'cost_gradient': ca.gradient(cost, both),
             'rows_jacobian': ca.jacobian(self.rows, both),
-            'factors': ca.gradient(lagrangian, self.z),
-            'hessian': ca.hessian(lagrangian, both)[0],
         }
-        inputs, values = [self.z, self.s, self.parameter, of_f, of_rows], [z, s, parameter, lam_f, lam]
-        return {name: _at(piece, inputs, values) for name, piece in pieces.items()}
+        with_multipliers = {'factors': ca.gradient(lagrangian, self.z), 'hessian': ca.hessian(lagrangian, both)[0]}
+        inputs, values = [self.z, self.s, self.parameter], [z, s, parameter]
+        found = {name: _at(piece, inputs, values) for name, piece in pieces.items()}
+        inputs, values = [*inputs, of_f, of_rows], [*values, lam_f, lam]
+        return found | {name: _at(piece, inputs, values) for name, piece in with_multipliers.items()}
 
     def inserted(self, z) -> list:
-        """Return ``weight``, ``cost``, ``rows`` and the Jacobian of the rows by (z, s) at expressions (SX) of the inner functions."""
+        """Return ``weight``, ``cost``, ``rows`` and their Jacobian by (z, s) at expressions (SX) of the inner functions."""
         pieces = [ca.SX(self.weight), ca.SX(self.cost), self.rows, ca.jacobian(self.rows, ca.vertcat(self.z, self.s))]
         return ca.substitute(pieces, [self.z], [z]) if z.numel() else pieces
 
@@ -198,11 +199,11 @@ def with_parts(nlp: Nlp, up, down) -> Nlp:
 
 
 def _at(expression, inputs, values):
-    """An SX expression at ``values``, of which only those that it depends on are evaluated."""
-    is_fixed = expression.is_constant()
-    used = [k for k, symbol in enumerate(inputs) if not is_fixed and symbol.numel() and ca.depends_on(expression, symbol)]
-    function = ca.Function('piece', [inputs[k] for k in used], [expression])
-    return function.call([values[k] for k in used])[0] if used else type(values[0])(ca.evalf(expression))
+    """An SX expression at ``values``, of which the first ones, inner functions, are only evaluated if it depends on them."""
+    if expression.is_constant():
+        return type(values[0])(ca.evalf(expression))
+    first = 0 if inputs[0].numel() and ca.depends_on(expression, inputs[0]) else 1
+    return ca.Function('piece', inputs[first:], [expression]).call(values[first:])[0]
 
 
 def _dot(factors, rows):
