@@ -48,7 +48,7 @@ class Outer:
             'weight': ca.SX(self.weight),
             'cost': cost,
             'rows': self.rows,
-            'cost_gradient': ca.gradient(cost, both),
+            'cost_gradient': ca.jacobian(cost, both).T,
             'rows_jacobian': ca.jacobian(self.rows, both),
         }
         with_multipliers = {'factors': ca.gradient(lagrangian, self.z), 'hessian': ca.hessian(lagrangian, both)[0]}
@@ -167,7 +167,8 @@ def _by_chain_rule(c, outer):
     at = outer.at(z, between(x, n, n + ns), between(p, 0, own), lam_f, between(lam_g, m, m + rows))
     chain, weight = ca.diagcat(J_z, kind.eye(ns)), at['weight']
     slopes = J_cost[0, :].T + weight * J_cost[1, :].T
-    gradient = ca.vertcat(slopes, kind(ns, 1)) + chain.T @ at['cost_gradient']
+    of_z, of_s = between(at['cost_gradient'], 0, c.inner), between(at['cost_gradient'], c.inner, c.inner + ns)
+    gradient = ca.vertcat(slopes + J_z.T @ of_z, of_s)
     jacobian = ca.vertcat(ca.horzcat(J_g, kind(m, ns)), at['rows_jacobian'] @ chain)
     of_model = d.hessian(*model, ca.vertcat(lam_f, lam_f * weight), between(lam_g, 0, m), at['factors'])
     hessian = ca.diagcat(of_model, kind(ns, ns)) + ca.triu(chain.T @ at['hessian'] @ chain)

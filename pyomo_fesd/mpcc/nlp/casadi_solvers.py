@@ -147,7 +147,7 @@ class _CasadiNlp(NlpSolver):
         if not self.TAKES_DERIVATIVES:
             return self._own
         x, p, f, g = self._problem.values()
-        return self._own | WITHOUT_PARAMETERS | _functions(x, p, f, g, self._derivatives or automatic(x, f, g))
+        return self._own | WITHOUT_PARAMETERS | derivative_functions(x, p, f, g, self._derivatives or automatic(x, f, g))
 
     def _solver_for(self, warm):
         """The solver for a start without or with multipliers, made when it is first needed."""
@@ -241,8 +241,8 @@ class CasadiUno(_CasadiNlp):
         return UNIFIED.get(stats['unified_return_status'], stats['return_status'])
 
 
-def _functions(x, p, f, g, d):
-    """casadi's options for derivatives.
+def derivative_functions(x, p, f, g, d) -> dict:
+    """Return casadi's options for the ``Derivatives`` d.
 
     Ipopt asks these functions for derivatives only, but casadi would evaluate the values in their signatures all the same.
     """
