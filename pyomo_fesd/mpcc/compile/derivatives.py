@@ -95,7 +95,7 @@ class ModelDerivatives:
         sizes = ('w', n), ('p', parameters), ('of_cost', 2), ('of_g', m), ('of_z', inner)
         self._parts, self._symbols = (functions.cost, functions.rows, functions.sides), [functions.kind.sym(*one) for one in sizes]
 
-    # a function for each part: an NLP's gradient needs no row, and where sides are linear its Hessian evaluates none of them
+    # A function for each part: an NLP's gradient needs no row, and its Hessian no part that is linear.  A certificate needs no Hessian.
 
     @cached_property
     def _values(self):
