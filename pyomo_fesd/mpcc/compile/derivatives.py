@@ -95,7 +95,7 @@ class ModelDerivatives:
         sizes = ('w', n), ('p', parameters), ('of_cost', 2), ('of_g', m), ('of_z', inner)
         self._parts, self._symbols = (functions.cost, functions.rows, functions.sides), [functions.kind.sym(*one) for one in sizes]
 
-    # A function for each part: an NLP's gradient needs no row, and its Hessian no part that is linear.  A certificate needs no Hessian.
+    # a function for each part: a gradient needs no row, a Hessian no part that is linear, and a certificate no Hessian
 
     @cached_property
     def _values(self):
