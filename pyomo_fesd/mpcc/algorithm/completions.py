@@ -28,9 +28,9 @@ CYCLES, PROGRESS = 6, 1e-3
 #: one misses.
 PATHS = {'auto': (('scholtes', 1.0), ('elastic', 1.0))}
 LOOSER = (1.0, 10.0)
-#: A further path is followed where the relaxations around the best point have an objective that is smaller by the first part, or
-#: the path before went astray: the second part of its relaxations did not reach their solutions, or one was infeasible.
-GAP, ASTRAY = 0.5, 0.5
+#: A further path is followed where the relaxations around the best point have an objective that is smaller by this part, or one of
+#: the path before was infeasible.
+GAP = 0.5
 #: With more than this part of the pairs undecided a relaxation names no branch.
 UNDECIDED = 0.5
 #: Part of the time limit after which no further round begins: the best point is certified in the rest.
@@ -40,8 +40,9 @@ SHARE = 0.6
 LONGER, LEAST_TIME = 2.0, 10.0
 #: Branch NLPs from one relaxation: one that stops on its way has better values of the free variables, but perhaps the wrong branch.
 ATTEMPTS = 2
-#: Two relaxations with objectives as close as this, relative, have the same solution.
-SAME = 1e-8
+#: Two relaxations with objectives as close as this, relative, have the same solution; and so have two branches, whose bi-active
+#: pairs may have either side.
+SAME, SAME_BRANCH = 1e-8, 1e-5
 #: Products of eps carry round-off.
 ROUND_OFF = 1.001
 
@@ -64,19 +65,18 @@ class Completions:
         self._paths = PATHS.get(form) or tuple((form, looser) for looser in LOOSER)
         self._form, self._share = self._paths[0][0], 1.0
         self._deadline, self._promise, self._possible = setup.deadline.part(SHARE), -np.inf, False
-        self._objectives, self._around, self._best = [], set(), None
+        self._objectives, self._around, self._best, self._end = [], set(), None, None
 
     def follow(self, start):
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
         for form, looser in self._paths:
             self._form, self._best, self._share = form, None, 1.0
-            solved, is_infeasible = self._down(start, self._options.eps_init * looser)
+            is_infeasible = self._down(start, self._options.eps_init * looser)
             if is_infeasible and (form, looser) != self._paths[-1]:
                 # it led away from all solutions: the next path has more to go on from
                 continue
             self._improve()
-            is_astray = is_infeasible or solved.count(False) >= ASTRAY * len(solved)
-            if not self._possible or not (is_astray or self._promising()) or self._deadline.expired():
+            if not self._possible or not (is_infeasible or self._promising()) or self._deadline.expired():
                 break
         if self.run.point is not None:
             self._certify()
@@ -84,20 +84,20 @@ class Completions:
     def _down(self, w, eps):
         """Rounds with ever smaller eps, each from the relaxation before.
 
-        Returns whether each reached its solution, and whether the last one ended as infeasible.  The points of a relaxation with a
-        smaller eps are among those of one before: after an infeasible one there is none.
+        They end where two in a row lead to the same branch: those around its solution lead on from it.  Returns whether one is
+        infeasible: the points of a relaxation with a smaller eps are among those of one before, so after it there is none.
         """
-        solved = []
-        least = max(LAST, self._options.eps_final)
+        least, before = max(LAST, self._options.eps_final), None
         while eps * ROUND_OFF >= least and not self._deadline.expired():
             is_last = eps * self._options.eps_factor * ROUND_OFF < least
             relaxed = self._round(w, eps, is_on_the_way=not is_last)
-            solved.append(relaxed.solved)
             if relaxed.status in INFEASIBLE:
-                return solved, True
-            w = relaxed.w
+                return True
+            if None not in (before, self._end) and abs(self._end - before) <= SAME_BRANCH * abs(before):
+                return False
+            w, before = relaxed.w, self._end
             eps *= self._options.eps_factor
-        return solved, False
+        return False
 
     def _improve(self):
         """Rounds around the best point of the path, until they no longer find a much better one."""
@@ -135,7 +135,7 @@ class Completions:
         Where a completion stops on its way, the other sides are those of the relaxation: on the way to smaller eps it is only worth
         a branch if it names one.
         """
-        self.run.eps = eps
+        self.run.eps, self._end = eps, None
         began = time.perf_counter()
         relaxed = self._subsolves.relax(self._form, w, eps, None, int(self._share * self._options.relaxation_iterations))
         self._share = BUDGET if relaxed.stopped else self._share
@@ -180,6 +180,7 @@ class Completions:
             result, equal = self._branches.solutions.beside(completed)
             if result is not None and self._subsolves.usable(result):
                 self._keep(result, equal)
+                self._end = self._c.evaluate(result.w).f
             if result is None or not result.stopped:
                 return
             w = result.w
