@@ -65,7 +65,7 @@ class Coincidences:
     def _go_on(self, found):
         """Descend from a better point in another order."""
         self._branches.improve_from(found, True)
-        if self.run.point.certificate.grade not in (Stationarity.B, Stationarity.LIMITED):
+        if not self.run.point.certificate.certified:
             # it may have changes that leave at the other end, or beside a place at its lower bound
             self._branches.try_neighbours()
 
