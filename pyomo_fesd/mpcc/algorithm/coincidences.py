@@ -79,7 +79,7 @@ class Coincidences:
             if order.key in tried:
                 continue
             tried.add(order.key)
-            found = next((better for better in (self._grown(point, way) for way in order.ways) if better is not None), None)
+            found = self._grown(point, order.ways)
             if found is not None:
                 self._go_on(found)
                 return True
@@ -111,13 +111,16 @@ class Coincidences:
         if not self._c.has_objective:
             return certificate
         nlp = NlpResult(w, self._c.evaluate(w).f, 'given', 0, np.zeros(0), np.zeros(0))
-        found = self._outcome(Point(nlp, nlp.f, certificate))
+        found = self._outcome(Point(nlp, nlp.f, certificate), goes_on=False)
         if found is SETTLED:
             return certificate
         return replace(certificate, grade=Stationarity.OPEN if found is OPEN else Stationarity.DESCENT)
 
-    def _outcome(self, point):
-        """A better point; or whether all orders are settled."""
+    def _outcome(self, point, goes_on=True):
+        """A better point; or whether all orders are settled.
+
+        Where the run ``goes_on`` the point may also be one that no small step leads to.
+        """
         tried, outcome = set(), SETTLED
         if self._is_flat(point):
             return SETTLED
@@ -132,7 +135,7 @@ class Coincidences:
             if order.key is not None and order.key in tried:
                 continue
             tried.add(order.key)
-            found = self._order(point, order, possible)
+            found = self._order(point, order, possible, goes_on)
             if found is OPEN:
                 outcome = OPEN
             elif found is not SETTLED:
@@ -146,7 +149,7 @@ class Coincidences:
         verdicts = (self._orders.judged(point, sets, row) for row in rows(possible))
         return SETTLED if all(verdict in SETTLING for verdict in verdicts) else OPEN
 
-    def _order(self, point, order, possible):
+    def _order(self, point, order, possible, goes_on=True):
         """A better point in an order; or its outcome.  What it inserts is appended to ``possible`` if that is possible."""
         verdicts = set()
         for judge in order.judges:
@@ -158,6 +161,9 @@ class Coincidences:
         if verdicts & SETTLING:
             return SETTLED
         inserts = bool(verdicts - {Verdict.NONE})
+        better = self._grown(point, order.ways) if inserts and goes_on else None
+        if better is not None:
+            return better
         found = self._first(partial(self._try, point, inserts), order.ways)
         if found is SETTLED and Verdict.DESCENT in verdicts:
             # a spare place is known to the tolerances of its NLP only: a slide with rates of round-off seems to have no room
@@ -192,22 +198,22 @@ class Coincidences:
 
         ``inserts`` is whether places can be inserted, so that their values have a limit.
         """
-        grown = self._grown(point, way) if inserts else None
-        if grown is not None:
-            return grown
         with self._c.vanishing(way.extents):
             found = self._without_extent(point, inserts, way)
         return found if isinstance(found, str) else self._better(point, *found)
 
-    def _grown(self, point, way):
-        """A better point in the branch of a way, from its places as they are; or None.
+    def _grown(self, point, ways):
+        """The first better point in the branches of some ways, from their places as they are; or None.
 
         Where places have no extent, what they hold is not determined, and an NLP with them at 0 may not end at all.
         """
-        start = way.start.copy()
-        start[way.extents] = point.w[way.extents]
-        found = self._better(point, (start,), way.zero)
-        return None if found is OPEN else found
+        for way in ways:
+            start = way.start.copy()
+            start[way.extents] = point.w[way.extents]
+            found = self._better(point, (start,), way.zero)
+            if found is not OPEN:
+                return found
+        return None
 
     def _without_extent(self, point, inserts, way):
         """The outcome of a way whose places have no extent; or starts and zero sides of a branch that may be better."""
