@@ -364,3 +364,16 @@ def test_only_a_point_that_is_nearly_as_good_counts_with_fewer_variables_at_thei
     assert (p.branches.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound))) is off) == found
     # no fewer than before
     assert p.branches.with_fewer_short(point) is None
+
+
+def test_branches_without_places_of_least_extent_are_those_of_all_and_of_each_one():
+    p = jump_inside_a_stage()
+    neighbours, point = p.branches.neighbours, p.run.point
+    assert not list(neighbours.with_fewer_short(point)), "no place is at its least extent"
+    short = [n for n in neighbours.all if n.short.size]
+    at_bound = point.w.copy()
+    for n in short:
+        at_bound[n.short] = p.compiled.lbx[n.short]
+    found = list(neighbours.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound))))
+    zero = p.subsolves.sets(at_bound, 1e-8).zero
+    assert len(found) > len(short) and all(np.any(other != zero) for other in found)
