@@ -57,7 +57,7 @@ class OrdersByInsertion:
         return self._subsolves.insertion(self._point, self._sets, self._row(numbers, coincidence, places, present), alone)
 
     def entered(self, way, coincidence) -> Verdict:
-        """The verdict of a change that has come in at an end between two rows: on both sides of it, or on one.
+        """The verdict of a change that has come in on both sides of an end between two rows: both must be possible.
 
         ``coincidence`` is that of the changes at this end; what happens there may happen before the change that has come in.
         """
@@ -67,11 +67,11 @@ class OrdersByInsertion:
         if any(k is None for k, _ in places):
             return Verdict.NONE
         found = [self._judged(way, [place], grows=False) for place in places]
-        possible = [place for place, verdict in zip(places, found) if verdict is not Verdict.IMPOSSIBLE]
         if Verdict.NONE in found:
             return Verdict.NONE
-        verdicts = [self._judged(way, possible, grows=True)] if possible else [Verdict.IMPOSSIBLE]
-        return of_orders(verdicts + self._behind_what_happens(way, coincidence))
+        # what has come in on one side only would have to go back as it arrives at the end
+        both = Verdict.IMPOSSIBLE if Verdict.IMPOSSIBLE in found else self._judged(way, places, grows=True)
+        return of_orders([both, *self._behind_what_happens(way, coincidence)])
 
     def _judged(self, way, places, grows):
         """The verdict of such a change in places in a row; unless it ``grows`` by their values alone."""
