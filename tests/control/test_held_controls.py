@@ -32,8 +32,8 @@ def second_plan(levels):
 
 @pytest.mark.parametrize('levels', [None, 5])
 def test_a_local_plan_that_keeps_the_pressure_far_too_high_is_left(levels):
-    # without levels 30.6, certified, was the end where nothing but small steps led on; with levels 0.652 was, and the search goes on
-    # from there to 0.644, where an order of switches stays open
+    # without levels 30.6, certified, was the end where nothing but small steps led on; with levels 0.652 was, and the search now
+    # goes on from there to 0.644, where an order of switches stays open
     m, answer = second_plan(levels=levels)
     assert answer.objective < 0.66
     found = {t: m.P[t].value for t in (2, 4, 10)}
