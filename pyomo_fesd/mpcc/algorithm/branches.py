@@ -28,9 +28,8 @@ SHRINK, SHRINKS = 0.1, 3
 #: Ipopt leaves sides without a multiplier at the root of its tolerance.  Those below this count as zero as well, if this descends
 #: clearly: gradients are inexact too.
 NEARLY, CLEAR = 1e-4, 1e-4
-#: HiGHS for an LPEC with a binary for every pair, which proves nothing: small descents and a long search are not worth it, nor is
-#: a direction that descends by half as much again: the branches that these name lie far away, where the slopes are others.
-WIDE = {'mip_abs_gap': 1e-6, 'mip_rel_gap': 0.5, 'mip_max_nodes': 100}
+#: HiGHS for an LPEC with a binary for every pair, which proves nothing: small descents and a long search are not worth it.
+WIDE = {'mip_abs_gap': 1e-6, 'mip_max_nodes': 100}
 #: With more bi-active pairs than this an LPEC takes long and tells little about the branch.
 SUGGESTED = 50
 #: Trust region of the LPEC that searches for any feasible branch.

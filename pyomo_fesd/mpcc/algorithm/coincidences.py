@@ -74,11 +74,8 @@ class Coincidences:
 
         Such a place is to be passed by: the change beside it would happen earlier, or later.
         """
-        sets, tried = self._subsolves.sets(point.w, self._tolerances.biactive), set()
+        sets = self._subsolves.sets(point.w, self._tolerances.biactive)
         for order in self._orders.at(point, sets):
-            if order.key in tried:
-                continue
-            tried.add(order.key)
             found = self._grown(point, order.ways)
             if found is not None:
                 self._go_on(found)
@@ -121,7 +118,7 @@ class Coincidences:
 
         Where the run ``goes_on`` the point may also be one that no small step leads to.
         """
-        tried, outcome = set(), SETTLED
+        outcome = SETTLED
         if self._is_flat(point):
             return SETTLED
         better = self._branches.without_short(point)
@@ -132,9 +129,6 @@ class Coincidences:
             return OPEN
         possible = []
         for order in self._orders.at(point, sets):
-            if order.key is not None and order.key in tried:
-                continue
-            tried.add(order.key)
             found = self._order(point, order, possible, goes_on)
             if found is OPEN:
                 outcome = OPEN

@@ -65,7 +65,7 @@ class Completions:
         self._paths = PATHS.get(form) or tuple((form, looser) for looser in LOOSER)
         self._form, self._share = self._paths[0][0], 1.0
         self._deadline, self._promise, self._possible = setup.deadline.part(SHARE), -np.inf, False
-        self._objectives, self._around, self._best, self._end = [], set(), None, None
+        self._objectives, self._around, self._best = [], set(), None
 
     def follow(self, start):
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
@@ -90,12 +90,12 @@ class Completions:
         least, before = max(LAST, self._options.eps_final), None
         while eps * ROUND_OFF >= least and not self._deadline.expired():
             is_last = eps * self._options.eps_factor * ROUND_OFF < least
-            relaxed = self._round(w, eps, is_on_the_way=not is_last)
+            relaxed, end = self._round(w, eps, is_on_the_way=not is_last)
             if relaxed.status in INFEASIBLE:
                 return True
-            if None not in (before, self._end) and abs(self._end - before) <= SAME_BRANCH * abs(before):
+            if None not in (before, end) and abs(end - before) <= SAME_BRANCH * abs(before):
                 return False
-            w, before = relaxed.w, self._end
+            w, before = relaxed.w, end
             eps *= self._options.eps_factor
         return False
 
@@ -130,12 +130,13 @@ class Completions:
         return relaxed.status not in INFEASIBLE and undecided <= UNDECIDED * self._c.pairs
 
     def _round(self, w, eps, is_on_the_way=False):
-        """One relaxation from ``w``, and the branch of its completion, unless it is known; returns the relaxation's result.
+        """One relaxation from ``w``, and the branch of its completion, unless it is known.
 
+        Returns the relaxation's result, and the objective of the branch, None without one.
         Where a completion stops on its way, the other sides are those of the relaxation: on the way to smaller eps it is only worth
         a branch if it names one.
         """
-        self.run.eps, self._end = eps, None
+        self.run.eps, end = eps, None
         began = time.perf_counter()
         relaxed = self._subsolves.relax(self._form, w, eps, None, int(self._share * self._options.relaxation_iterations))
         self._share = BUDGET if relaxed.stopped else self._share
@@ -144,9 +145,9 @@ class Completions:
             self._promise = self._c.evaluate(relaxed.w).f
         if not self._is_known(relaxed):
             seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
-            self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))
+            end = self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))
         self._after(self.run)
-        return relaxed
+        return relaxed, end
 
     def _is_known(self, relaxed):
         """Whether a relaxation before had the same solution."""
@@ -156,10 +157,10 @@ class Completions:
         return is_known
 
     def _explore(self, w, seconds, to_the_end):
-        """Solve the branch of the completion of ``w`` without guide bounds."""
+        """Solve the branch of the completion of ``w`` without guide bounds; returns its objective."""
         narrow = self._c.widen()
         try:
-            self._branch_of_completion(w, seconds, to_the_end)
+            return self._branch_of_completion(w, seconds, to_the_end)
         finally:
             if narrow:
                 self._c.narrow()
@@ -167,23 +168,25 @@ class Completions:
     def _branch_of_completion(self, w, seconds, to_the_end=False):
         """Solve the branch that the completion of ``w`` names; where that stops on its way, the completion of its end once more.
 
-        With ``to_the_end`` only one that is complete names a branch.
+        With ``to_the_end`` only one that is complete names a branch.  Returns the objective, None without a solution.
         """
+        end = None
         for _ in range(ATTEMPTS):
             completed, is_complete, note = self._complete(w, seconds)
             self._subsolves.note(note, completed)
             self._possible = self._possible or is_complete
             if to_the_end and not is_complete:
-                return
+                break
             if is_complete:
                 self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
             result, equal = self._branches.solutions.beside(completed)
             if result is not None and self._subsolves.usable(result):
                 self._keep(result, equal)
-                self._end = self._c.evaluate(result.w).f
+                end = self._c.evaluate(result.w).f
             if result is None or not result.stopped:
-                return
+                break
             w = result.w
+        return end
 
     def _keep(self, solved, equal=None):
         """Keep a feasible point that is better than the best of the path, or of all; its certificate comes at the end."""

@@ -102,7 +102,15 @@ class Orders:
         self._subsolves, self._c, self._tolerances = subsolves, subsolves.compiled, subsolves.tolerances
 
     def at(self, point, sets) -> Iterator[Order]:
-        """Yield the orders of the changes that fall together at a point."""
+        """Yield the orders of the changes that fall together at a point, those with the same key once."""
+        seen = set()
+        for order in self._all(point, sets):
+            key = order.key
+            if key is None or key not in seen:
+                seen.add(key)
+                yield order
+
+    def _all(self, point, sets):
         w, inserted = point.w, OrdersByInsertion(self._subsolves, point, sets)
         for coincidence, at in self._situations(w, sets):
             present = [change for change in coincidence.changes if differs(change, at)]

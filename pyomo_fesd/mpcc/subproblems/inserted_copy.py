@@ -20,8 +20,6 @@ NEAR = 0.2
 CLEAR = 1e-3
 #: A distance from a bound that shrinks by this factor or more is zero at the limit.
 SHRINKS = 0.5
-#: A distance that grows by this factor or more, as the extent falls to a tenth, grows without a limit.
-GROWS = 2.0
 #: Smaller distances, relative, are round-off; a surface is not missed by more where a point lies on it.
 ROUND_OFF, MISSED = 1e-9, 1e-6
 #: Orders in the extent with which a bound may be missed.
@@ -179,16 +177,6 @@ class Copy:
             return True
         rows = np.flatnonzero((short > ROUND_OFF) & (short <= SHRINKS * long))
         return any(self._misses_by_order(w, k, long[k] / short[k]) for k in rows if k < len(self.rows) and self._knows(k))
-
-    def diverges(self) -> bool:
-        """Whether it has no limit as a value leaves its bounds by ever more, the smaller the extent is.
-
-        A force that would have to hold back at once what leaves a surface: so beside the point its sides are not possible.
-        """
-        if len(self._at) < len(EXTENTS):
-            return False
-        long, short = (self._missed(at) for at in self._at)
-        return any(map(self._knows, np.flatnonzero((long > CLEAR) & (short > GROWS * long))))
 
     def misses(self) -> bool:
         """Whether its values miss a bound, which other ones might not where they are not determined."""

@@ -123,8 +123,7 @@ class Insertions:
             if copy.impossible(w):
                 return Verdict.IMPOSSIBLE
             return Verdict.UNKNOWN if copy.misses() else None
-        impossible = copy.diverges() or copy.contradicts_itself(w, insertion.guesses)
-        return Verdict.IMPOSSIBLE if impossible else Verdict.UNKNOWN
+        return Verdict.IMPOSSIBLE if copy.contradicts_itself(w, insertion.guesses) else Verdict.UNKNOWN
 
     def _charge(self, w, sets, equal, unchanged):
         """The descent per unit of a copy that changes nothing."""

@@ -61,16 +61,10 @@ def test_a_completion_is_kept_as_it_is_if_its_branch_is_no_better():
 
 
 def to_other_branches():
-    """Completions whose branches differ: the solution of each one is its own start."""
+    """Completions whose branches have objectives of their own."""
     p, rounds, asked = completions(lambda x: (0.3, True))
-    ends = iter(range(99))
-    branch = rounds._branch_of_completion
-
-    def to_another_branch(*args):
-        branch(*args)
-        rounds._end = float(next(ends))
-
-    rounds._branch_of_completion = to_another_branch
+    branch, objectives = rounds._branch_of_completion, iter(range(99))
+    rounds._branch_of_completion = lambda *args: branch(*args) and float(next(objectives))
     return p, rounds, asked
 
 

@@ -54,18 +54,3 @@ def test_a_copy_at_its_limit_misses_no_row():
     assert copy.solve(s.w, (1,))
     low, high, lower, upper, _ = copy.limits(1.0)
     assert np.all(low <= 0) and np.all(high >= 0) and np.all(lower <= 0) and np.all(upper >= 0)
-
-
-@pytest.mark.parametrize(
-    'long, short, diverges',
-    [(0.5, 5.0, True), (0.5, 0.5, False), (5e-4, 5e-3, False), (0.5, 0.05, False)],
-    ids=['grows', 'constant', 'as small as tolerances', 'vanishes'],
-)
-def test_a_bound_that_is_missed_by_ever_more_is_not_possible(long, short, diverges, monkeypatch):
-    s = inserted.simulated(5, 'heaviside')
-    copy = copy_of(s, 1, 1)
-    assert not copy.diverges(), "nothing has been followed yet"
-    assert copy.solve(s.w, (1,)) and not copy.diverges()
-    missed = iter([np.array([0.0, long]), np.array([0.0, short])])
-    monkeypatch.setattr(copy, '_missed', lambda at: next(missed))
-    assert copy.diverges() == diverges
