@@ -54,11 +54,16 @@ class BranchSolutions:
     at_once : bool
         whether a branch is first solved with the decisions that its sides ask for: without any, places of an objective that is
         large beside the penalty shrink to nothing
+
+    Attributes
+    ----------
+    all_certified : list of Point
+        each certified solution found so far
     """
 
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
-        self._at_once, self._known = at_once and self._c.eta.numel() > 0, {}
+        self._at_once, self._known, self.all_certified = at_once and self._c.eta.numel() > 0, {}, []
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -87,7 +92,7 @@ class BranchSolutions:
         """A solution with the decisions ``equal``, and solved again with those that it asks for as well; none that still asks."""
         if solved is None:
             return None, None
-        asked = (self._c.evaluate(solved.w).eta > self._tolerances.eta) & ~equal
+        asked = self._subsolves.asked(solved.w, zero) & ~equal
         if not asked.any():
             return solved, equal
         if not left:
@@ -98,9 +103,13 @@ class BranchSolutions:
     def _point(self, found, below, enough):
         if found.nlp is None or _is_clearly_above(found.f, below) or found.f > enough:
             return None
-        if found.certificate is None:
+        is_new = found.certificate is None
+        if is_new:
             found.certificate = self._subsolves.certify(found.nlp, found.equal)
-        return Point(found.nlp, found.f, found.certificate, found.equal) if found.certificate.feasible else None
+        point = Point(found.nlp, found.f, found.certificate, found.equal)
+        if is_new and point.certificate.certified:
+            self.all_certified.append(point)
+        return point if point.certificate.feasible else None
 
     def _solution(self, w, zero, duals, below, **more):
         more |= {'steepest': STEEP * max(1.0, abs(below))}
@@ -129,38 +138,40 @@ class BranchSolutions:
     def _solve(self, w, zero, duals, below, **more):
         """Two NLPs where pairs are to be decided (eq. 13): with the penalty to find eta, then with the constraints in force.
 
-        With ``at_once`` only one, unless that one does not reach its solution.
+        With ``at_once`` the sides of the branch decide, before the first one.
         """
         if self._at_once:
             solved, equal = self._decided_by_sides(w, zero, duals=duals, **more)
-            if solved is not None and solved.solved:
-                return _Solution(nlp=solved, equal=equal)
+            return _Solution(nlp=solved, equal=equal)
         first = self._subsolves.attempt(w, zero, None, 1.0, duals=duals, **more)
         if first is not None and not self._subsolves.usable(first):
-            solved, equal = self._decided_at_once(w, zero, first, **more)
+            solved, equal = self._decided_from_afar(w, zero, first, **more) if self._c.eta.numel() else (None, None)
         elif first is not None and first.solved and _is_clearly_above(self._c.evaluate(first.w).f, below):
             return _Solution(self._c.evaluate(first.w).f, is_left=True)
         else:
             solved, equal = self.decided(first, zero, **more)
         return _Solution(nlp=solved, equal=equal)
 
-    def _decided_at_once(self, w, zero, first, **more):
-        """One NLP with the decisions that the sides of the branch ask for, after an attempt ``first`` without them that came near.
+    def _decided_by_sides(self, w, zero, **more):
+        """The NLP of a branch with the decisions that its sides ask for, from nearby, then from afar."""
+        equal = self._subsolves.asked(w, zero)
+        first = None if equal is None else self._subsolves.attempt(w, zero, equal, 0.0, **more)
+        if first is None:
+            return None, None
+        if not self._subsolves.usable(first):
+            return self._decided_from_afar(w, zero, first, **more)
+        return self._with_all(first, zero, equal, **more)
+
+    def _decided_from_afar(self, w, zero, first, **more):
+        """One NLP with the decisions that the sides of the branch ask for, after an attempt ``first`` that came near.
 
         Without decisions places without a change may shrink to nothing, and the equations of what they hold lose their rank.
         """
-        at_sides = self._subsolves.on_sides(w, zero) if self._c.eta.numel() else None
-        if at_sides is None or self._subsolves.violation(first.w) > max(NEAR, NEARER * self._subsolves.violation(at_sides)):
-            return None, None
-        return self._decided_by_sides(w, zero, far=True, **more | {'max_iter': None})
-
-    def _decided_by_sides(self, w, zero, **more):
-        """The NLP of a branch with the decisions that its sides ask for, and then with those that its solution asks for."""
         at_sides = self._subsolves.on_sides(w, zero)
-        if at_sides is None:
+        if self._subsolves.violation(first.w) > max(NEAR, NEARER * self._subsolves.violation(at_sides)):
             return None, None
-        equal = self._c.evaluate(at_sides).eta > self._tolerances.eta
-        return self._with_all(self._subsolves.branch(w, zero, equal, 0.0, **more), zero, equal, **more)
+        equal, more = self._subsolves.asked(w, zero), more | {'max_iter': None, 'duals': None}
+        return self._with_all(self._subsolves.branch(w, zero, equal, 0.0, far=True, **more), zero, equal, far=True, **more)
 
     def decided(self, first, zero, apart=False, **more):
         """The second NLP, after the solution ``first`` of a branch, and the decisions in force; none of ``apart``."""

@@ -4,6 +4,7 @@ The best point so far is ``Run.point``: an exactly complementary solution of its
 """
 
 from collections import Counter, deque
+from operator import attrgetter
 
 import numpy as np
 
@@ -106,6 +107,14 @@ class Branches:
         if certificate.certified:
             self.improve_from(Point(result, self._c.evaluate(result.w).f, certificate, equal), False)
         return certificate.certified
+
+    def take_certified(self):
+        """Make the best certified point that was found the incumbent, if that is not certified and not better by ``UNEVEN``."""
+        best = self.run.point
+        enough = best.f + UNEVEN * max(1.0, abs(best.f))
+        others = [point for point in self.solutions.all_certified if point.f <= enough]
+        if others and not best.certificate.certified:
+            self.run.point = min(others, key=attrgetter('f'))
 
     def try_neighbours(self):
         """Solve the neighbouring branches of the incumbent, and those of each better point found, until none of them is better.

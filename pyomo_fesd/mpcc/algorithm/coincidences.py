@@ -44,7 +44,7 @@ class Coincidences:
 
     def settle(self):
         """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
-        while self.run.point is not None and self._c.has_objective:
+        while self.run.point is not None and self.run.point is not self._settled and self._c.has_objective:
             before = self.run.point
             if not before.certificate.certified:
                 if before.certificate.grade is not Stationarity.LIMITED or not self._leads_on(before):

@@ -116,7 +116,9 @@ class HybridSolver:
 
     def _from_start(self):
         """Completions or the homotopy; without a feasible point from there, a search."""
-        if not self._complete():
+        if self._complete():
+            self._branches.take_certified()
+        else:
             self._follow_path()
         if self.run.point is not None and self._c.has_objective:
             self._branches.try_neighbours()

@@ -97,6 +97,14 @@ class Subsolves:
         """``w`` within the bounds of a branch; None if these contradict each other."""
         return self._branches().on_sides(w, zero)
 
+    def asked(self, w, zero):
+        """The decisions that the sides of a branch ask for: their eta is positive inside it; None if its bounds contradict.
+
+        At its ends, where a free side is 0 as well, eta is that of other branches: an impact without an impulse is no change.
+        """
+        inside = self._branches().inside(w, zero)
+        return None if inside is None else self._c.evaluate(inside).eta > self.tolerances.eta
+
     def _branches(self):
         return self._build('branch', lambda make: Branch(self._c, self._sides, make), 'branch')
 

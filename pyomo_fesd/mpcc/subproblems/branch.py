@@ -29,6 +29,8 @@ NEAR = {'mu_strategy': 'monotone', 'mu_init': 1e-4, 'bound_push': 1e-4, 'bound_f
 #: Violation of the rows, and of the complementarity of bounds: in the user's unit of the objective where that is larger than the
 #: solver's, down to the last one.
 FEASIBILITY, OPTIMALITY, LEAST = 1e-11, 1e-10, 1e-12
+#: A side that is this far from 0 is free: far more than eq. (12) adds to its sums, and little beside values that count.
+GROWN = 1e-6
 #: Status of a branch that has a solution only if places of fillings are open.
 UNDECIDED = 'fillings undecided'
 #: A row without free variables, or one of more equations than free variables, may miss its bounds by this much.
@@ -153,6 +155,20 @@ class Branch:
         """Return ``w`` within the bounds of the branch ``zero``; None if these contradict each other."""
         bounds = self._bounds(settle(self._c, self._sides, w, zero))
         return None if bounds is None else np.clip(w, *bounds)
+
+    def inside(self, w, zero):
+        """``on_sides``, with every side that the branch leaves free above 0, at least by ``GROWN``, as far as bounds decide it."""
+        zero = settle(self._c, self._sides, w, zero)
+        bounds = self._bounds(zero)
+        if bounds is None:
+            return None
+        (lbx, ubx), sides = bounds, self._sides
+        j, bound = sides.variables(np.roll(sides.zero_rows(zero), len(zero)) & (sides.row_of < 0))
+        lower, upper = j[bound == 1], j[bound == 2]
+        inner = np.clip(w, lbx, ubx)
+        inner[lower] = np.maximum(inner[lower], lbx[lower] + GROWN)
+        inner[upper] = np.minimum(inner[upper], ubx[upper] - GROWN)
+        return np.clip(inner, lbx, ubx)
 
     def infeasible(self, zero) -> bool:
         """Whether a linear program shows that the branch ``zero``, in which pairs may be FREE, has no point."""

@@ -34,13 +34,14 @@ def test_multipliers_say_what_a_violation_is_worth(violation):
 @pytest.mark.parametrize('asked, found', [([], True), ([1], True), ([1, 2], True), ([1, 2, 3], False)])
 def test_decisions_that_a_solution_asks_for_are_added_some_times(asked, found):
     def solution(k):
-        return SimpleNamespace(w=np.eye(4)[k])
+        return SimpleNamespace(w=np.eye(4, dtype=bool)[k])
 
     # the last one asks for what is imposed already
     rest = [solution(k) for k in (*asked, 0)]
     subsolves = SimpleNamespace(
-        compiled=SimpleNamespace(evaluate=lambda w: SimpleNamespace(eta=w), eta=SimpleNamespace(numel=lambda: 4)),
-        tolerances=SimpleNamespace(eta=0.5),
+        compiled=SimpleNamespace(eta=SimpleNamespace(numel=lambda: 4)),
+        tolerances=None,
+        asked=lambda w, zero: w,
         branch=lambda w, zero, equal, weight, duals: rest.pop(0),
     )
     solved, equal = BranchSolutions(subsolves)._with_all(rest.pop(0), None, np.array([True, False, False, False]))

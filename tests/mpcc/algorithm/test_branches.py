@@ -268,6 +268,35 @@ def test_a_branch_that_fails_near_its_rows_is_solved_with_the_decisions_of_its_s
         assert point.w == pytest.approx(p.point(x=2.0, y=0.0, z=1.0), abs=1e-6) and point.equal.all()
 
 
+@pytest.mark.parametrize('x, y', [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)])
+@pytest.mark.parametrize('zero, asks', [(H_ZERO, True), (G_ZERO, False)])
+def test_a_branch_asks_for_the_decisions_inside_it_wherever_it_is_looked_at(x, y, zero, asks):
+    """At the origin eta is 0, though it is 1 along the whole branch on which x may be positive."""
+    p = parts(with_a_decision())
+    asked = p.subsolves.asked(np.array(p.point(x=x, y=y, z=3.0)), np.full(p.compiled.pairs, zero))
+    assert asked.tolist() == [asks]
+
+
+def test_the_best_certified_point_takes_the_place_of_one_that_is_a_little_better_but_not_certified():
+    p = parts(two_minima(1.0, 0.0))
+    certified = p.branches.solutions.certified(p.compiled.x0, np.full(p.compiled.pairs, H_ZERO))
+    assert certified.certificate.certified
+    for better_by, taken in ((2 * branches.UNEVEN, False), (branches.UNEVEN / 2, True)):
+        grade = replace(certified.certificate, grade=Stationarity.LIMITED)
+        p.run.point = replace(certified, f=certified.f - better_by, certificate=grade)
+        p.branches.take_certified()
+        assert (p.run.point is certified) == taken
+
+
+def test_a_certified_point_stays():
+    p = parts(two_minima(1.0, 0.0))
+    first, other = (p.branches.solutions.certified(p.compiled.x0, np.full(p.compiled.pairs, side)) for side in (G_ZERO, H_ZERO))
+    p.run.point = max(first, other, key=lambda point: point.f)
+    before = p.run.point
+    p.branches.take_certified()
+    assert p.run.point is before
+
+
 def test_a_feasible_point_is_kept_where_the_nlp_from_there_fails(monkeypatch):
     p = parts(two_minima(1.0, 0.0))
     attempt, calls = p.subsolves.attempt, []
