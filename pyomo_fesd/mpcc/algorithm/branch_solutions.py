@@ -5,6 +5,7 @@ Leaves: a ``Point``; None where the branch has no solution.
 """
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Optional
 
 import numpy as np
@@ -54,16 +55,11 @@ class BranchSolutions:
     at_once : bool
         whether a branch is first solved with the decisions that its sides ask for: without any, places of an objective that is
         large beside the penalty shrink to nothing
-
-    Attributes
-    ----------
-    all_certified : list of Point
-        each certified solution found so far
     """
 
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
-        self._at_once, self._known, self.all_certified = at_once and self._c.eta.numel() > 0, {}, []
+        self._at_once, self._known = at_once and self._c.eta.numel() > 0, {}
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -73,11 +69,20 @@ class BranchSolutions:
         """
         if duals is not None or 'box' in more:
             return self._point(self._solution(w, zero, duals, below, **more), below, enough)
-        key = hash((w.tobytes(), zero.tobytes(), self._c.lbx.tobytes(), self._c.ubx.tobytes(), *sorted(more.items())))
+        start = self._subsolves.on_sides(w, zero)
+        if start is None:
+            return None
+        key = hash((start.tobytes(), zero.tobytes(), self._c.lbx.tobytes(), self._c.ubx.tobytes(), *sorted(more.items())))
         found = self._known.get(key)
         if found is None or (found.is_left and not _is_clearly_above(found.f, below)):
             self._known[key] = found = self._solution(w, zero, duals, below, **more)
         return self._point(found, below, enough)
+
+    def up_to(self, enough):
+        """Yield the solutions found so far whose objective is at most ``enough``, the best first, if the LPEC certifies them."""
+        found = [one for one in self._known.values() if one.nlp is not None and one.f <= enough]
+        points = (self._point(one, np.inf, np.inf) for one in sorted(found, key=attrgetter('f')))
+        return (point for point in points if point is not None and point.certificate.certified)
 
     def onward(self, point, zero, enough):
         """The certified solution of a branch from ``point``; None without one of at most ``enough``.
@@ -103,13 +108,9 @@ class BranchSolutions:
     def _point(self, found, below, enough):
         if found.nlp is None or _is_clearly_above(found.f, below) or found.f > enough:
             return None
-        is_new = found.certificate is None
-        if is_new:
+        if found.certificate is None:
             found.certificate = self._subsolves.certify(found.nlp, found.equal)
-        point = Point(found.nlp, found.f, found.certificate, found.equal)
-        if is_new and point.certificate.certified:
-            self.all_certified.append(point)
-        return point if point.certificate.feasible else None
+        return Point(found.nlp, found.f, found.certificate, found.equal) if found.certificate.feasible else None
 
     def _solution(self, w, zero, duals, below, **more):
         more |= {'steepest': STEEP * max(1.0, abs(below))}

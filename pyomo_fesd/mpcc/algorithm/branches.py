@@ -4,7 +4,6 @@ The best point so far is ``Run.point``: an exactly complementary solution of its
 """
 
 from collections import Counter, deque
-from operator import attrgetter
 
 import numpy as np
 
@@ -109,12 +108,10 @@ class Branches:
         return certificate.certified
 
     def take_certified(self):
-        """Make the best certified point that was found the incumbent, if that is not certified and not better by ``UNEVEN``."""
+        """Make the best certified solution found the incumbent, if that is not certified and not better by ``UNEVEN``."""
         best = self.run.point
-        enough = best.f + UNEVEN * max(1.0, abs(best.f))
-        others = [point for point in self.solutions.all_certified if point.f <= enough]
-        if others and not best.certificate.certified:
-            self.run.point = min(others, key=attrgetter('f'))
+        if best is not None and not best.certificate.certified:
+            self.run.point = next(self.solutions.up_to(_as_good(best)), best)
 
     def try_neighbours(self):
         """Solve the neighbouring branches of the incumbent, and those of each better point found, until none of them is better.
@@ -171,12 +168,17 @@ class Branches:
         """A certified point in such a branch, or in one without any of them, with fewer variables at their lower bound; or None.
 
         Orders of changes beside a place of least extent may not be known.  The others are not evenly distributed beside it, and the
-        objective has the error of that: the point counts if it is as good but for ``UNEVEN``.  Each branch is tried once.
+        objective has the error of that: the point counts if it is as good but for ``UNEVEN``.  Solutions that are known come first,
+        also without such places beside one without them; each of them, and each branch, is tried once.
         """
-        return self._with_fewer_short(point, point.f + UNEVEN * max(1.0, abs(point.f)))
+        return self._with_fewer_short(point, _as_good(point))
 
     def _with_fewer_short(self, point, enough):
         number = self.neighbours.number_of_short(point.w)
+        self._left_out.add(point.w.tobytes())
+        for known in self.solutions.up_to(enough):
+            if self.neighbours.number_of_short(known.w) < max(number, 1) and known.w.tobytes() not in self._left_out:
+                return known
         for zero in self.neighbours.with_fewer_short(point):
             if zero.tobytes() in self._left_out:
                 continue
@@ -359,6 +361,11 @@ class Branches:
         if point is not None and point.certificate.grade is not Stationarity.DESCENT:
             self._attempts[key], self._solved[key] = TRIES, point.f
         return point
+
+
+def _as_good(point):
+    """The objective of points without places of least extent that are as good as ``point``."""
+    return point.f + UNEVEN * max(1.0, abs(point.f))
 
 
 def _settles(better, point):

@@ -129,6 +129,7 @@ class HybridSolver:
         """Descend, and try all orders of changes, before the point counts."""
         self._c.widen()
         self._descend_at_last()
+        self._branches.take_certified()
         self._settle()
 
     def _try_neighbours_at_last(self):

@@ -285,7 +285,7 @@ def test_the_best_certified_point_takes_the_place_of_one_that_is_a_little_better
         grade = replace(certified.certificate, grade=Stationarity.LIMITED)
         p.run.point = replace(certified, f=certified.f - better_by, certificate=grade)
         p.branches.take_certified()
-        assert (p.run.point is certified) == taken
+        assert p.run.point.certificate.certified == taken
 
 
 def test_a_certified_point_stays():
@@ -389,10 +389,25 @@ def test_only_a_point_that_is_nearly_as_good_counts_with_fewer_variables_at_thei
         return off if off.f <= enough else None
 
     monkeypatch.setattr(p.branches.solutions, 'certified', certified)
+    monkeypatch.setattr(p.branches.solutions, 'up_to', lambda enough: iter(()))
     monkeypatch.setattr(p.branches.neighbours, 'with_fewer_short', lambda point: [np.zeros(1, dtype=int)])
     assert (p.branches.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound))) is off) == found
     # no fewer than before
     assert p.branches.with_fewer_short(point) is None
+
+
+def test_a_known_solution_with_fewer_variables_at_their_lower_bound_comes_first_and_once():
+    p = jump_inside_a_stage()
+    point, short = p.run.point, p.compiled.neighbours[0].short
+    at_bound = point.w.copy()
+    at_bound[short] = p.compiled.lbx[short]
+    nlps = len(p.kinds('branch'))
+    known = p.branches.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound)))
+    assert known.certificate.certified and known.f == pytest.approx(point.f, abs=1e-9) and len(p.kinds('branch')) == nlps
+    assert p.branches.neighbours.number_of_short(known.w) == 0
+    # the point itself is not another one
+    other = p.branches.with_fewer_short(known)
+    assert other is None or not np.array_equal(other.w, known.w)
 
 
 def test_branches_without_places_of_least_extent_are_those_of_all_and_of_each_one():
