@@ -55,11 +55,16 @@ class BranchSolutions:
     at_once : bool
         whether a branch is first solved with the decisions that its sides ask for: without any, places of an objective that is
         large beside the penalty shrink to nothing
+
+    Attributes
+    ----------
+    at_once : bool
+        False without pairs to decide
     """
 
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
-        self._at_once, self._known = at_once and self._c.eta.numel() > 0, {}
+        self.at_once, self._known = at_once and self._c.eta.numel() > 0, {}
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -141,7 +146,7 @@ class BranchSolutions:
 
         With ``at_once`` the sides of the branch decide, before the first one.
         """
-        if self._at_once:
+        if self.at_once:
             solved, equal = self._decided_by_sides(w, zero, duals=duals, **more)
             return _Solution(nlp=solved, equal=equal)
         first = self._subsolves.attempt(w, zero, None, 1.0, duals=duals, **more)

@@ -308,26 +308,31 @@ class Branches:
         return next((better for better in found if is_below(better, enough)), None)
 
     def _step_down(self, point, enough):
-        """In the branch of the direction: from its end, within ever smaller trust regions, or onward from the point."""
-        step, w = point.certificate.lpec, point.w
-        better = self._point(w + step.d, step.zero, None, False)
-        radius = self._tolerances.radius
-        sets = self._subsolves.sets(w, self._tolerances.biactive)
-        for _ in range(SHRINKS):
-            if is_below(better, enough) or _settles(better, point):
-                return better
-            radius *= SHRINK
-            step = self._subsolves.lpec(w, sets, radius, point.equal)
-            if not step.solved or step.descent == 0.0:
-                break
-            reach = radius * np.maximum(1.0, np.abs(w))
-            within = {'box': (w - reach, w + reach), 'max_iter': self._first}
-            better = self.solutions.certified(w + step.d, step.zero, below=point.f, **within)
+        """In the branch of the direction: from its end, or onward from the point, or within ever smaller trust regions."""
+        step = point.certificate.lpec
+        better = self._point(point.w + step.d, step.zero, None, False)
         if is_below(better, enough) or _settles(better, point):
             return better
         # from the end of a direction Ipopt may go back; from the point itself it follows it, if slowly
         follows = self._patient and point.equal is not None
-        return self.solutions.onward(point, point.certificate.lpec.zero, enough) if follows else None
+        onward = self.solutions.onward(point, step.zero, enough) if follows else None
+        return self._within_reach(point, enough) if onward is None else onward
+
+    def _within_reach(self, point, enough):
+        """In the branch of the best direction within a trust region, which shrinks until one leads down."""
+        w, radius = point.w, self._tolerances.radius
+        sets = self._subsolves.sets(w, self._tolerances.biactive)
+        for _ in range(SHRINKS):
+            radius *= SHRINK
+            step = self._subsolves.lpec(w, sets, radius, point.equal)
+            if not step.solved or step.descent == 0.0:
+                return None
+            reach = radius * np.maximum(1.0, np.abs(w))
+            within = {'box': (w - reach, w + reach), 'max_iter': self._first}
+            better = self.solutions.certified(w + step.d, step.zero, below=point.f, **within)
+            if is_below(better, enough) or _settles(better, point):
+                return better
+        return None
 
     def _beyond(self, point, enough, tolerance, clear, limits=None):
         """A better point in the branch that the LPEC names if all sides below ``tolerance`` count as zero."""

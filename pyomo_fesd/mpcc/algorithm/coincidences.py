@@ -235,18 +235,36 @@ class Coincidences:
         start[way.extents] = most[way.extents] = 0.0
         more = {'box': (-most, most), 'max_iter': PATIENCE}
         more['box'][0][way.extents] = 0.0
+        apart = self._decides(point.w, way.extents)
+        if self._branches.solutions.at_once:
+            return self._beside_with_decisions(start, way, apart, **more)
         first = self._subsolves.attempt(start, zero, None, 1.0, **more)
         if first is None or first.status in INFEASIBLE:
-            # without a place to spare the branch lacks another change of the incumbent, which shows nothing about the order
-            return ABSENT if way.spares else OPEN, None
+            return self._absent(way), None
         if first.solved and self._c.evaluate(first.w).f > point.f + AS_GOOD * max(1.0, abs(point.f)):
             return OPEN, None
-        apart = self._decides(point.w, way.extents)
         solved, equal = self._branches.solutions.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
         if first.solved and (solved is None or not solved.solved):
             # without decisions there is more room: an order that does not descend then does not descend with them
             solved, equal = self._subsolves.attempt(first.w, zero, None, 0.0, **more), np.zeros_like(apart)
         return (solved, equal) if solved is not None and solved.solved else (OPEN, None)
+
+    def _beside_with_decisions(self, start, way, apart, **more):
+        """``_beside`` with the decisions that the sides of the branch ask for at once."""
+        asked = self._subsolves.asked(start, way.zero)
+        if asked is None:
+            return self._absent(way), None
+        equal = asked & ~apart
+        solved = self._subsolves.attempt(start, way.zero, equal, 0.0, **more)
+        return (solved, equal) if solved is not None and solved.solved else (OPEN, None)
+
+    @staticmethod
+    def _absent(way):
+        """The outcome where no branch of a way contains the incumbent.
+
+        Without a place to spare the branch lacks another change of the incumbent, which shows nothing about the order.
+        """
+        return ABSENT if way.spares else OPEN
 
     def _is_another(self, point, other):
         """Whether another solution does not meet the incumbent: its places are not the same."""

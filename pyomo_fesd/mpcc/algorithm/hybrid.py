@@ -53,7 +53,8 @@ class HybridSolver:
         self._setup, self._c, self._options, self.run = setup, setup.compiled, setup.options, Run()
         self._subsolves = Subsolves(setup, Tolerances.of(self._options), self.run)
         self._gap = GapTest(self._options.gap_tol * 1e-2, self._options.gap_tol)
-        search, patient = GLOBAL_LPEC_SEARCH[self._options.lpec](self._c), setup.complete is not None
+        search = GLOBAL_LPEC_SEARCH[self._options.lpec](self._c)
+        patient = setup.complete is not None or bool(self._c.impacts)
         self._branches = Branches(self._subsolves, self._gap, search, patient)
         self._evenness = Evenness(self._subsolves, self._branches, setup.even)
         self._coincidences = Coincidences(self._subsolves, self._branches)
