@@ -83,9 +83,9 @@ class BranchSolutions:
             self._known[key] = found = self._solution(w, zero, duals, below, **more)
         return self._point(found, below, enough)
 
-    def up_to(self, enough):
-        """Yield the solutions found so far whose objective is at most ``enough``, the best first, if the LPEC certifies them."""
-        found = [one for one in self._known.values() if one.nlp is not None and one.f <= enough]
+    def up_to(self, enough, suits=lambda w: True):
+        """Yield the certified ones of the solutions found so far that suit and are at most ``enough``, the best first."""
+        found = [one for one in self._known.values() if one.nlp is not None and one.f <= enough and suits(one.nlp.w)]
         points = (self._point(one, np.inf, np.inf) for one in sorted(found, key=attrgetter('f')))
         return (point for point in points if point is not None and point.certificate.certified)
 

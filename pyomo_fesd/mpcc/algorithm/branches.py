@@ -4,6 +4,7 @@ The best point so far is ``Run.point``: an exactly complementary solution of its
 """
 
 from collections import Counter, deque
+from functools import partial
 
 import numpy as np
 
@@ -176,9 +177,10 @@ class Branches:
     def _with_fewer_short(self, point, enough):
         number = self.neighbours.number_of_short(point.w)
         self._left_out.add(point.w.tobytes())
-        for known in self.solutions.up_to(enough):
-            if self.neighbours.number_of_short(known.w) < max(number, 1) and known.w.tobytes() not in self._left_out:
-                return known
+        fewer = partial(self._is_left_with_fewer, max(number, 1))
+        known = next(self.solutions.up_to(enough, fewer), None)
+        if known is not None:
+            return known
         for zero in self.neighbours.with_fewer_short(point):
             if zero.tobytes() in self._left_out:
                 continue
@@ -191,6 +193,10 @@ class Branches:
             if end is not None and end.certificate.certified:
                 return end
         return None
+
+    def _is_left_with_fewer(self, number, w):
+        """Whether values were not tried yet, and have fewer variables at their lower bound than a ``number``."""
+        return w.tobytes() not in self._left_out and self.neighbours.number_of_short(w) < number
 
     def _beside_short(self, point, enough):
         """Yield the solutions, of at most ``enough``, of the neighbouring branches for each variable at its lower bound."""

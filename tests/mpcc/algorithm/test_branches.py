@@ -389,7 +389,7 @@ def test_only_a_point_that_is_nearly_as_good_counts_with_fewer_variables_at_thei
         return off if off.f <= enough else None
 
     monkeypatch.setattr(p.branches.solutions, 'certified', certified)
-    monkeypatch.setattr(p.branches.solutions, 'up_to', lambda enough: iter(()))
+    monkeypatch.setattr(p.branches.solutions, 'up_to', lambda enough, suits: iter(()))
     monkeypatch.setattr(p.branches.neighbours, 'with_fewer_short', lambda point: [np.zeros(1, dtype=int)])
     assert (p.branches.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound))) is off) == found
     # no fewer than before
