@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from problems import carried
 from pyomo.common.timing import HierarchicalTimer
 
 from pyomo_fesd.mpcc.algorithm.branches import Branches
@@ -54,3 +55,10 @@ def parts(model, **options):
     subsolves = Subsolves(setup, Tolerances.of(config), run)
     gap = GapTest(config.gap_tol * 1e-2, config.gap_tol)
     return Parts(model, c, setup, run, subsolves, gap, Branches(subsolves, gap, GLOBAL_LPEC_SEARCH[config.lpec](c)))
+
+
+def jump_inside_a_stage():
+    """The parts for a state jump at t = 0.6, at the second of two inner boundaries of the first control stage, simulated."""
+    p = parts(carried.simulated_with_jump(6))
+    p.branches.explore_from(p.compiled.x0, False)
+    return p

@@ -22,6 +22,8 @@ ASKED = 2
 NEAR, NEARER = 1e-2, 0.1
 #: A more even solution may cost this much more, relative: the error of uneven elements, not another minimum.
 AS_GOOD = 1e-4
+#: One without places of least extent may cost this much more: the error of uneven ones, of any order.
+UNEVEN = 1e-2
 #: A branch that is to be below another objective is left where multipliers stay above this, relative to that: where it has a
 #: solution at all, a violation of 1e-4 is worth a tenth of the objective there.
 STEEP = 1e3
@@ -205,3 +207,8 @@ class BranchSolutions:
 
 def _is_clearly_above(f, below):
     return f > below + AS_GOOD * max(1.0, abs(below))
+
+
+def as_good(point):
+    """Return the largest objective of a certified point that may take the place of ``point``."""
+    return point.f + UNEVEN * max(1.0, abs(point.f))

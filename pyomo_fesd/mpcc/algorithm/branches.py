@@ -4,11 +4,10 @@ The best point so far is ``Run.point``: an exactly complementary solution of its
 """
 
 from collections import Counter, deque
-from functools import partial
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import FIRST, SECOND, BranchSolutions
+from pyomo_fesd.mpcc.algorithm.branch_solutions import FIRST, SECOND, BranchSolutions, as_good
 from pyomo_fesd.mpcc.algorithm.neighbours import Neighbours
 from pyomo_fesd.mpcc.algorithm.search import FEW, Verdict, exhaust, leaves
 from pyomo_fesd.mpcc.algorithm.state import Point
@@ -18,8 +17,6 @@ from pyomo_fesd.mpcc.subproblems import MATTERS, Stationarity
 PROGRESS = 1e-8
 #: So much in a neighbouring branch, where a place of least extent gives a little less to each one that takes it over.
 WORTH = 1e-6
-#: A point without places of least extent may cost this much more, relative: the error of uneven ones, of any order.
-UNEVEN = 1e-2
 #: So much from a point whose branch NLP did not end: smaller steps only go on in a branch that Ipopt cannot finish.
 UNFINISHED = 1e-3
 #: Attempts at a branch NLP before it counts as infeasible.
@@ -55,7 +52,7 @@ class Branches:
     def __init__(self, subsolves, gap, global_lpec, patient=False):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
-        self._attempts, self._solved, self._exhausted, self._left_out = Counter(), {}, {}, set()
+        self._attempts, self._solved, self._exhausted = Counter(), {}, {}
         self._patient = patient
         self.solutions, self.neighbours = BranchSolutions(subsolves, at_once=patient), Neighbours(subsolves)
 
@@ -112,7 +109,7 @@ class Branches:
         """Make the best certified solution found the incumbent, if that is not certified and not better by ``UNEVEN``."""
         best = self.run.point
         if best is not None and not best.certificate.certified:
-            self.run.point = next(self.solutions.up_to(_as_good(best)), best)
+            self.run.point = next(self.solutions.up_to(as_good(best)), best)
 
     def try_neighbours(self):
         """Solve the neighbouring branches of the incumbent, and those of each better point found, until none of them is better.
@@ -157,57 +154,6 @@ class Branches:
     def _is_progress(self, before, part):
         """Whether the incumbent is better than a point ``before`` by this relative part."""
         return self.run.point.f < before.f - part * max(1.0, abs(before.f))
-
-    def without_short(self, point):
-        """A better point in a neighbouring branch for a variable of ``point`` at its lower bound; None if there is none.
-
-        What a place of least extent holds is as small as the tolerances: the LPEC does not see that only the bound keeps it.
-        """
-        return next(self._beside_short(point, point.f - PROGRESS * max(1.0, abs(point.f))), None)
-
-    def with_fewer_short(self, point):
-        """A certified point in such a branch, or in one without any of them, with fewer variables at their lower bound; or None.
-
-        Orders of changes beside a place of least extent may not be known.  The others are not evenly distributed beside it, and the
-        objective has the error of that: the point counts if it is as good but for ``UNEVEN``.  Solutions that are known come first,
-        also without such places beside one without them; each of them, and each branch, is tried once.
-        """
-        return self._with_fewer_short(point, _as_good(point))
-
-    def _with_fewer_short(self, point, enough):
-        number = self.neighbours.number_of_short(point.w)
-        self._left_out.add(point.w.tobytes())
-        fewer = partial(self._is_left_with_fewer, max(number, 1))
-        known = next(self.solutions.up_to(enough, fewer), None)
-        if known is not None:
-            return known
-        for zero in self.neighbours.with_fewer_short(point):
-            if zero.tobytes() in self._left_out:
-                continue
-            self._left_out.add(zero.tobytes())
-            end = self.improve_from(self.solutions.certified(point.w, zero, max_iter=SECOND, below=enough, enough=enough), True)
-            if end is None or self.neighbours.number_of_short(end.w) >= number:
-                continue
-            if end.certificate.grade is Stationarity.LIMITED:
-                end = self._with_fewer_short(end, enough)
-            if end is not None and end.certificate.certified:
-                return end
-        return None
-
-    def _is_left_with_fewer(self, number, w):
-        """Whether values were not tried yet, and have fewer variables at their lower bound than a ``number``."""
-        return w.tobytes() not in self._left_out and self.neighbours.number_of_short(w) < number
-
-    def _beside_short(self, point, enough):
-        """Yield the solutions, of at most ``enough``, of the neighbouring branches for each variable at its lower bound."""
-        for zero in self.neighbours.beside_short(point):
-            found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=point.f, enough=enough)
-            if found is not None:
-                yield found
-
-    def has_short(self, point) -> bool:
-        """Whether a variable of ``point`` is at its lower bound, so that there are branches for ``without_short``."""
-        return next(self.neighbours.beside_short(point), None) is not None
 
     def _widen_from(self, end):
         """Go on without guide bounds from a point below the incumbent that only these keep from descending."""
@@ -372,11 +318,6 @@ class Branches:
         if point is not None and point.certificate.grade is not Stationarity.DESCENT:
             self._attempts[key], self._solved[key] = TRIES, point.f
         return point
-
-
-def _as_good(point):
-    """The objective of points without places of least extent that are as good as ``point``."""
-    return point.f + UNEVEN * max(1.0, abs(point.f))
 
 
 def _settles(better, point):

@@ -15,6 +15,7 @@ import numpy as np
 from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND
 from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
 from pyomo_fesd.mpcc.algorithm.orders import NEAR_BOUND, Orders, has_more_at_end, rows
+from pyomo_fesd.mpcc.algorithm.short_places import ShortPlaces
 from pyomo_fesd.mpcc.algorithm.state import Point
 from pyomo_fesd.mpcc.algorithm.subsolves import INFEASIBLE
 from pyomo_fesd.mpcc.nlp import NlpResult
@@ -40,7 +41,7 @@ class Coincidences:
     def __init__(self, subsolves, branches):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._branches, self._settled = subsolves, branches, None
-        self._orders = Orders(subsolves)
+        self._orders, self._short = Orders(subsolves), ShortPlaces(branches)
 
     def settle(self):
         """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
@@ -84,7 +85,7 @@ class Coincidences:
 
     def _takes_fewer_short(self, point):
         """Whether there is a point with fewer places of least extent, or a better one on the way, which is the incumbent now."""
-        before, other = self.run.point, self._branches.with_fewer_short(point)
+        before, other = self.run.point, self._short.fewer(point)
         if other is not None:
             self.run.point = other
         return self.run.point is not before
@@ -99,7 +100,7 @@ class Coincidences:
         if not self._c.has_objective or self._is_flat(point):
             return False
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)
-        if self._holds_anything(point.w, sets) or self._branches.has_short(point):
+        if self._holds_anything(point.w, sets) or self._short.are_at(point):
             return True
         return next(self._orders.at(point, sets), None) is not None
 
@@ -121,7 +122,7 @@ class Coincidences:
         outcome = SETTLED
         if self._is_flat(point):
             return SETTLED
-        better = self._branches.without_short(point)
+        better = self._short.better(point)
         if better is not None:
             return better
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)

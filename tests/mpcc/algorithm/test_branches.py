@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pyomo.environ as pyo
 import pytest
-from problems import carried, mpcc_collection, small_mpccs
-from problems.parts import parts
+from problems import mpcc_collection, small_mpccs
+from problems.parts import jump_inside_a_stage, parts
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import BranchConstraint, homotopy_hints
@@ -281,7 +281,7 @@ def test_the_best_certified_point_takes_the_place_of_one_that_is_a_little_better
     p = parts(two_minima(1.0, 0.0))
     certified = p.branches.solutions.certified(p.compiled.x0, np.full(p.compiled.pairs, H_ZERO))
     assert certified.certificate.certified
-    for better_by, taken in ((2 * branches.UNEVEN, False), (branches.UNEVEN / 2, True)):
+    for better_by, taken in ((2 * branch_solutions.UNEVEN, False), (branch_solutions.UNEVEN / 2, True)):
         grade = replace(certified.certificate, grade=Stationarity.LIMITED)
         p.run.point = replace(certified, f=certified.f - better_by, certificate=grade)
         p.branches.take_certified()
@@ -351,13 +351,6 @@ def test_patience_is_told_once():
 # Neighbouring branches of a moving grid
 
 
-def jump_inside_a_stage():
-    """A state jump at t = 0.6, at the second of two inner boundaries of the first control stage; simulated."""
-    p = parts(carried.simulated_with_jump(6))
-    p.branches.explore_from(p.compiled.x0, False)
-    return p
-
-
 def test_a_neighbouring_branch_moves_what_changes_at_its_boundary():
     p = jump_inside_a_stage()
     at_stage = [n for n in p.compiled.neighbours if not n.short.size]
@@ -375,39 +368,6 @@ def test_with_the_decisions_of_its_sides_a_branch_takes_one_nlp(at_once, nlps):
     point = branch_solutions.BranchSolutions(p.subsolves, at_once).certified(w, zero, max_iter=branch_solutions.SECOND)
     assert len(p.kinds('branch')) == before + nlps and point.certificate.certified
     assert np.any(point.equal) and p.compiled.decided(point.w)[point.equal] == pytest.approx(0, abs=1e-8)
-
-
-@pytest.mark.parametrize('cost, found', [(0.5 * branches.UNEVEN, True), (2 * branches.UNEVEN, False)])
-def test_only_a_point_that_is_nearly_as_good_counts_with_fewer_variables_at_their_lower_bound(cost, found, monkeypatch):
-    p = jump_inside_a_stage()
-    point, short = p.run.point, p.compiled.neighbours[0].short
-    at_bound, off = point.w.copy(), replace(point, f=point.f + cost * max(1.0, abs(point.f)))
-    at_bound[short] = p.compiled.lbx[short]
-    assert p.branches.neighbours.number_of_short(at_bound) == p.branches.neighbours.number_of_short(point.w) + len(short) > 0
-
-    def certified(w, zero, enough, **options):
-        return off if off.f <= enough else None
-
-    monkeypatch.setattr(p.branches.solutions, 'certified', certified)
-    monkeypatch.setattr(p.branches.solutions, 'up_to', lambda enough, suits: iter(()))
-    monkeypatch.setattr(p.branches.neighbours, 'with_fewer_short', lambda point: [np.zeros(1, dtype=int)])
-    assert (p.branches.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound))) is off) == found
-    # no fewer than before
-    assert p.branches.with_fewer_short(point) is None
-
-
-def test_a_known_solution_with_fewer_variables_at_their_lower_bound_comes_first_and_once():
-    p = jump_inside_a_stage()
-    point, short = p.run.point, p.compiled.neighbours[0].short
-    at_bound = point.w.copy()
-    at_bound[short] = p.compiled.lbx[short]
-    nlps = len(p.kinds('branch'))
-    known = p.branches.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound)))
-    assert known.certificate.certified and known.f == pytest.approx(point.f, abs=1e-9) and len(p.kinds('branch')) == nlps
-    assert p.branches.neighbours.number_of_short(known.w) == 0
-    # the point itself is not another one
-    other = p.branches.with_fewer_short(known)
-    assert other is None or not np.array_equal(other.w, known.w)
 
 
 def test_branches_without_places_of_least_extent_are_those_of_all_and_of_each_one():

@@ -71,6 +71,6 @@ def test_a_point_without_places_of_least_extent_takes_the_place_of_one_whose_ord
     p, coincidences, order = a_branch(lambda point: None, monkeypatch)
     before, other = p.run.point, replace(p.run.point, f=p.run.point.f + 1e-3)
     monkeypatch.setattr(coincidences, '_outcome', lambda point: SETTLED if point is other else OPEN)
-    monkeypatch.setattr(p.branches, 'with_fewer_short', lambda point: other)
+    monkeypatch.setattr(coincidences._short, 'fewer', lambda point: other)
     coincidences.settle()
     assert p.run.point is other is not before
