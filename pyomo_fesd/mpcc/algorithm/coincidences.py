@@ -53,6 +53,7 @@ class Coincidences:
                 continue
             # until all orders are settled any certified point is better
             self.run.point = replace(before, certificate=replace(before.certificate, grade=Stationarity.OPEN))
+            self._short.leave_out(before)
             found = self._outcome(before)
             if found is OPEN and self._takes_fewer_short(before):
                 continue

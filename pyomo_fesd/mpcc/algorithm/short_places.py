@@ -39,6 +39,10 @@ class ShortPlaces:
                 return found
         return None
 
+    def leave_out(self, point):
+        """Do not return this point: its orders have been tried, and one of them may lead to the point that asks for another."""
+        self._tried.add(point.w.tobytes())
+
     def fewer(self, point):
         """A certified point in such a branch, or in one without any of them, with fewer variables at their lower bound; or None.
 
@@ -50,7 +54,6 @@ class ShortPlaces:
 
     def _fewer(self, point, enough):
         number = self._neighbours.number_of_short(point.w)
-        self._tried.add(point.w.tobytes())
         known = next(self._solutions.up_to(enough, partial(self._is_new_with_fewer, max(number, 1))), None)
         return self._beside(point, enough, number) if known is None else known
 
