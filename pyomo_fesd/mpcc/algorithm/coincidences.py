@@ -239,10 +239,13 @@ class Coincidences:
         more['box'][0][way.extents] = 0.0
         apart = self._decides(point.w, way.extents)
         if self._branches.solutions.at_once:
-            return self._beside_with_decisions(start, way, apart, **more)
+            found = self._beside_with_decisions(start, zero, apart, **more)
+            if found is not None:
+                return found
         first = self._subsolves.attempt(start, zero, None, 1.0, **more)
         if first is None or first.status in INFEASIBLE:
-            return self._absent(way), None
+            # without a place to spare the branch lacks another change of the incumbent, which shows nothing about the order
+            return ABSENT if way.spares else OPEN, None
         if first.solved and self._c.evaluate(first.w).f > point.f + AS_GOOD * max(1.0, abs(point.f)):
             return OPEN, None
         solved, equal = self._branches.solutions.decided(first, zero, apart=apart, **more) if first.solved else (None, None)
@@ -251,22 +254,16 @@ class Coincidences:
             solved, equal = self._subsolves.attempt(first.w, zero, None, 0.0, **more), np.zeros_like(apart)
         return (solved, equal) if solved is not None and solved.solved else (OPEN, None)
 
-    def _beside_with_decisions(self, start, way, apart, **more):
-        """``_beside`` with the decisions that the sides of the branch ask for at once."""
-        asked = self._subsolves.asked(start, way.zero)
+    def _beside_with_decisions(self, start, zero, apart, **more):
+        """``_beside`` with the decisions that the sides of the branch ask for at once; None where it may have a solution without."""
+        asked = self._subsolves.asked(start, zero)
         if asked is None:
-            return self._absent(way), None
+            return None
         equal = asked & ~apart
-        solved = self._subsolves.attempt(start, way.zero, equal, 0.0, **more)
-        return (solved, equal) if solved is not None and solved.solved else (OPEN, None)
-
-    @staticmethod
-    def _absent(way):
-        """The outcome where no branch of a way contains the incumbent.
-
-        Without a place to spare the branch lacks another change of the incumbent, which shows nothing about the order.
-        """
-        return ABSENT if way.spares else OPEN
+        solved = self._subsolves.attempt(start, zero, equal, 0.0, **more)
+        if solved is None or solved.status in INFEASIBLE:
+            return None
+        return (solved, equal) if solved.solved else (OPEN, None)
 
     def _is_another(self, point, other):
         """Whether another solution does not meet the incumbent: its places are not the same."""
