@@ -48,7 +48,7 @@ class Coincidences:
         while self.run.point is not None and self.run.point is not self._settled and self._c.has_objective:
             before = self.run.point
             if not before.certificate.certified:
-                if before.certificate.grade is not Stationarity.LIMITED or not self._leads_on(before):
+                if not self._leads_on(before):
                     return
                 continue
             # until all orders are settled any certified point is better
@@ -72,12 +72,13 @@ class Coincidences:
             self._branches.try_neighbours()
 
     def _leads_on(self, point):
-        """Whether there is a point to go on from, where only places of least extent keep the incumbent from descending.
+        """Whether there is a point to go on from, as the incumbent is not certified.
 
-        Such a place is to be passed by: the change beside it would happen earlier, or later.
+        Where only places of least extent keep it from descending, these are to be passed by: the change beside such a place would
+        happen earlier, or later.
         """
         sets = self._subsolves.sets(point.w, self._tolerances.biactive)
-        for order in self._orders.at(point, sets):
+        for order in self._orders.at(point, sets) if point.certificate.grade is Stationarity.LIMITED else ():
             found = self._grown(point, order.ways)
             if found is not None:
                 self._go_on(found)
@@ -255,7 +256,7 @@ class Coincidences:
         return (solved, equal) if solved is not None and solved.solved else (OPEN, None)
 
     def _beside_with_decisions(self, start, zero, apart, **more):
-        """``_beside`` with the decisions that the sides of the branch ask for at once; None where it may have a solution without."""
+        """``_beside`` with the decisions that the sides of the branch ask for; None where it may have a solution without them."""
         asked = self._subsolves.asked(start, zero)
         if asked is None:
             return None
