@@ -4,6 +4,7 @@ The best point so far is ``Run.point``: an exactly complementary solution of its
 """
 
 from collections import Counter, deque
+from itertools import chain
 
 import numpy as np
 
@@ -106,10 +107,15 @@ class Branches:
         return certificate.certified
 
     def take_certified(self):
-        """Make the best certified solution found the incumbent, if that is not certified and not better by ``UNEVEN``."""
+        """Make the best certified solution found the incumbent, if that is not certified and not better by ``UNEVEN``.
+
+        Those without variables at their lower bound come first: where there are any, orders of changes may stay open.
+        """
         best = self.run.point
         if best is not None and not best.certificate.certified:
-            self.run.point = next(self.solutions.up_to(as_good(best)), best)
+            enough, number = as_good(best), self.neighbours.number_of_short
+            known = chain(self.solutions.up_to(enough, lambda w: not number(w)), self.solutions.up_to(enough))
+            self.run.point = next(known, best)
 
     def try_neighbours(self):
         """Solve the neighbouring branches of the incumbent, and those of each better point found, until none of them is better.
