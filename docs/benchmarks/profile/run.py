@@ -1,9 +1,9 @@
-"""Profile: which part of the package uses the seconds of eight workloads.
+"""Profile: which part of the package uses the seconds of nine workloads, and their memory.
 
     .venv/bin/python docs/benchmarks/profile/run.py --label before [--macmpec FOLDER] [--only WORKLOAD] [--fresh]
 
 Appends a row of CPU seconds for each workload to rows.csv, the medians of its runs, and draws summary.png; workloads that have a
-row of this label are skipped.  Each workload is a process of its own.  FOLDER holds the instances of MacMPEC (see
+row of this label are skipped.  Each workload is a process of its own; ``memory`` is the most that it used, in MB.  FOLDER holds the instances of MacMPEC (see
 docs/benchmarks/mpcc).
 """
 
@@ -11,6 +11,7 @@ import argparse
 import gc
 import json
 import os
+import resource
 import statistics
 import sys
 from pathlib import Path
@@ -36,7 +37,7 @@ PARTS = (
     *('build', 'initialise', 'transform', 'march', 'write', 'import', 'derivatives', 'evaluations', 'linear algebra'),
     *('LPEC', 'review', 'other'),
 )
-COLUMNS = ('workload', 'label', 'runs', 'total', *PARTS)
+COLUMNS = ('workload', 'label', 'runs', 'memory', 'total', *PARTS)
 #: Parts that the timer of ``mpec_hybrid`` measures -> the paths of its phases, added, and those inside them, subtracted.
 PHASES = {
     'march': ([('simulate',)], []),
@@ -73,7 +74,8 @@ def medians(name, instances):
     runs, workload = known[name]
     measure(known[WARM_UP][1])
     rows = [measure(workload) for _ in range(runs)]
-    return {'workload': name, 'runs': runs} | {part: statistics.median(row[part] for row in rows) for part in ('total', *PARTS)}
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return {'workload': name, 'runs': runs, 'memory': memory} | {part: statistics.median(row[part] for row in rows) for part in ('total', *PARTS)}
 
 
 def draw(table):

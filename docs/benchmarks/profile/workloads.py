@@ -88,6 +88,7 @@ def workloads(instances: Path | None) -> dict:
     found = {
         'signum': (5, partial(_cold, signum.build, 10, 2)),
         'tank N = 100': (5, partial(_cold, gas_liquid_tank.build, 100, 3)),
+        'tank N = 400': (3, partial(_cold, gas_liquid_tank.build, 400, 3)),
         'tank N = 1600': (1, partial(_cold, gas_liquid_tank.build, 1600, 3)),
         f'cascade S = {TANKS}': (3, partial(_cold, partial(cascade.build, TANKS), ELEMENTS, 3)),
         'IDAES N = 60': (3, partial(flowsheet, 60)),
