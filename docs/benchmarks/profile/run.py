@@ -3,8 +3,8 @@
     .venv/bin/python docs/benchmarks/profile/run.py --label before [--macmpec FOLDER] [--only WORKLOAD] [--fresh]
 
 Appends a row of CPU seconds for each workload to rows.csv, the medians of its runs, and draws summary.png; workloads that have a
-row of this label are skipped.  Each workload is a process of its own; ``memory`` is the most that it used, in MB.  FOLDER holds the instances of MacMPEC (see
-docs/benchmarks/mpcc).
+row of this label are skipped.  Each workload is a process of its own; ``memory`` is the most that it used, in MB.  FOLDER holds the
+instances of MacMPEC (see docs/benchmarks/mpcc).
 """
 
 import argparse
@@ -75,7 +75,8 @@ def medians(name, instances):
     measure(known[WARM_UP][1])
     rows = [measure(workload) for _ in range(runs)]
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return {'workload': name, 'runs': runs, 'memory': memory} | {part: statistics.median(row[part] for row in rows) for part in ('total', *PARTS)}
+    found = {part: statistics.median(row[part] for row in rows) for part in ('total', *PARTS)}
+    return {'workload': name, 'runs': runs, 'memory': memory} | found
 
 
 def draw(table):

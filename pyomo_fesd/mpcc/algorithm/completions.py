@@ -71,31 +71,32 @@ class Completions:
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
         for form, looser in self._paths:
             self._form, self._best, self._share = form, None, 1.0
-            is_infeasible = self._down(start, self._options.eps_init * looser)
-            if is_infeasible and (form, looser) != self._paths[-1]:
-                # it led away from all solutions: the next path has more to go on from
+            is_last = (form, looser) == self._paths[-1]
+            leads_away = self._down(start, self._options.eps_init * looser, is_last)
+            if leads_away and not is_last:
                 continue
             self._improve()
-            if not self._possible or not (is_infeasible or self._promising()) or self._deadline.expired():
+            if not self._possible or not (leads_away or self._promising()) or self._deadline.expired():
                 break
         if self.run.point is not None:
             self._certify()
 
-    def _down(self, w, eps):
+    def _down(self, w, eps, is_last_path=True):
         """Rounds with ever smaller eps, each from the relaxation before.
 
-        They end where two in a row lead to the same branch: those around its solution lead on from it.  Returns whether one is
-        infeasible: the points of a relaxation with a smaller eps are among those of one before, so after it there is none.
+        They end where two in a row lead to the same branch: those around its solution lead on from it.  Returns whether the path
+        leads away from all solutions, so that the next one has more to go on from: a relaxation is infeasible (the points of one
+        with a smaller eps are among those of one before), or already the first does not reach its solution.
         """
-        least, before = max(LAST, self._options.eps_final), None
+        least, before, may_lead_away = max(LAST, self._options.eps_final), None, not is_last_path
         while eps * ROUND_OFF >= least and not self._deadline.expired():
             is_last = eps * self._options.eps_factor * ROUND_OFF < least
             relaxed, end = self._round(w, eps, is_on_the_way=not is_last)
-            if relaxed.status in INFEASIBLE:
+            if relaxed.status in INFEASIBLE or (may_lead_away and relaxed.stopped):
                 return True
             if None not in (before, end) and abs(end - before) <= SAME_BRANCH * abs(before):
                 return False
-            w, before = relaxed.w, end
+            w, before, may_lead_away = relaxed.w, end, False
             eps *= self._options.eps_factor
         return False
 

@@ -135,6 +135,21 @@ def test_a_path_that_ends_infeasible_is_followed_by_one_of_the_other_form(monkey
     assert p.run.point.certificate.grade is Stationarity.B
 
 
+@pytest.mark.parametrize('number, forms', [(1, ['scholtes', 'elastic']), (2, ['scholtes', 'scholtes'])])
+def test_a_path_whose_first_relaxation_does_not_reach_its_solution_is_left_for_the_other_form(number, forms, monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    relax, asked = p.subsolves.relax, []
+
+    def stopped(form, *args):
+        asked.append(form)
+        result = relax(form, *args)
+        return replace(result, status='User_Requested_Stop') if len(asked) == number else result
+
+    monkeypatch.setattr(p.subsolves, 'relax', stopped)
+    rounds.follow(p.compiled.x0)
+    assert asked[:2] == forms
+
+
 def test_another_path_goes_around_its_own_points(monkeypatch):
     # the first path has the better point, the branch of the second one is worse: relaxations begin there nevertheless
     p, rounds, _ = completions(lambda x: (0.3 if rounds._form == 'scholtes' else 0.0, True))
