@@ -55,7 +55,7 @@ from pyomo_fesd.core.homotopy_hints import (
     all_hints,
     homotopy_hints,
 )
-from pyomo_fesd.core.insertion import insert
+from pyomo_fesd.core.insertion import insert, variable_at
 from pyomo_fesd.core.instants import Instant
 from pyomo_fesd.core.interpolation import interpolation_weights
 from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible
@@ -70,9 +70,9 @@ from pyomo_fesd.core.positive_part import add_part_of_number, add_positive_part,
 from pyomo_fesd.core.private_data import records_below, remember_records
 from pyomo_fesd.core.renamed import Renamed
 from pyomo_fesd.core.rollback import restored, restored_on_error
-from pyomo_fesd.core.smallest import add_smallest, declare_smallest
+from pyomo_fesd.core.smallest import add_smallest, declare_smallest, start_smallest
 from pyomo_fesd.core.stamp import Stamp
-from pyomo_fesd.core.step import add_step, declare_step
+from pyomo_fesd.core.step import add_step, declare_step, start_step
 from pyomo_fesd.core.structural_key import StructuralKey, any_number, exactly, nine_digits, variables_of
 from pyomo_fesd.core.sums import product_of, sum_of, weighted_sum
 from pyomo_fesd.core.switched_systems import (

@@ -6,6 +6,7 @@ Does not apply: where the user has named components, which may be References.
 """
 
 from collections.abc import Collection, Iterable, Iterator
+from operator import itemgetter
 
 from pyomo.core import Block, Var
 from pyomo.core.base.block import BlockData
@@ -32,14 +33,18 @@ def _of_state(components, active):
 def declared(block: Block, types: Collection) -> Iterable:
     """Return the components of some ``types`` on ``block`` itself, in the order of their declaration."""
     # most blocks have none, or a few: Pyomo takes longer to make a map than to follow its own list
-    ordered, first, places = block._decl_order, block._ctypes, []
+    ordered, first, found = block._decl_order, block._ctypes, []
     for ctype in types:
         place = first[ctype][0] if ctype in first else None
         while place is not None:
-            places.append(place)
-            place = ordered[place][1]
-    # a component that was deleted leaves None
-    return [ordered[place][0] for place in sorted(places) if ordered[place][0] is not None]
+            component, following = ordered[place]
+            # one that was deleted leaves None
+            if component is not None:
+                found.append((place, component))
+            place = following
+    if len(types) > 1:
+        found.sort(key=itemgetter(0))
+    return [component for _, component in found]
 
 
 def is_reference(component) -> bool:

@@ -6,6 +6,7 @@ Does not apply: to components of another type, such as a number for a variable; 
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from pyomo.common.numeric_types import native_types
 from pyomo.core.expr import numeric_expr as nodes
@@ -39,28 +40,27 @@ class Stamp:
         # the expression is kept, so that no other one gets its id
         found = self._builders.get(id(expr))
         if found is None:
-            found = self._builders[id(expr)] = expr, _builder(expr, self._places)
-        return found[1](others)
+            found = self._builders[id(expr)] = expr, self.builder([expr])
+        return found[1](others)[0]
+
+    def builder(self, expressions: Sequence) -> Callable:
+        """Return the function from ``others`` to all ``expressions`` with them; nodes that these share are shared again."""
+        places = dict(self._places)
+        steps = _steps(expressions, places)
+        roots = [places[id(expr)] for expr in expressions]
+
+        def build(others):
+            values = list(others)
+            for make, arguments in steps:
+                values.append(arguments if make is None else make([values[k] for k in arguments]))
+            return [values[root] for root in roots]
+
+        return build
 
 
-def _builder(expr, places) -> Callable:
-    """The function from other components to the expression."""
-    places = dict(places)
-    steps = _steps(expr, places)
-    root = places[id(expr)]
-
-    def build(others):
-        values = list(others)
-        for make, arguments in steps:
-            values.append(arguments if make is None else make([values[k] for k in arguments]))
-        return values[root]
-
-    return build
-
-
-def _steps(expr, places):
+def _steps(expressions, places):
     """``(function, places of its arguments)`` of each node, after those of its arguments; ``(None, value)`` of constant ones."""
-    steps, parts, constant, waiting = [], len(places), set(), [expr]
+    steps, parts, constant, waiting = [], len(places), set(), list(expressions)[::-1]
     while waiting:
         node = waiting[-1]
         arguments = node.args if node.__class__ not in native_types and node.is_expression_type() else ()
@@ -85,4 +85,6 @@ def _steps(expr, places):
 
 
 def _maker(node):
+    if node.__class__ is relations.InequalityExpression:
+        return partial(relations.InequalityExpression, strict=node.strict)
     return node.__class__ if node.__class__ in MADE_FROM_ARGUMENTS else node.create_node_with_local_data

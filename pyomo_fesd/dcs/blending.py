@@ -1,6 +1,7 @@
 """Write one Disjunction at one time: its multipliers, the blended equations (theory, eq. 7) and the way back to the sources.
 
-Takes: a ``ModeSystem`` or ``HysteresisSystem``, and the form that was chosen for it (None where one mode is left).
+Takes: a ``ModeSystem``, ``RecognisedSystem`` or ``HysteresisSystem``, and the form that was chosen for it (None where one mode is
+    left).
 Leaves: a block beside the Disjunction, of its name, with the components of the smallest form, ``mode`` (eq. 7) and ``own``
     (copies of variables for implicit modes), or blocks below for other forms and sizes; the record of multipliers; the Disjunction
     and its disjuncts are deactivated.
@@ -14,10 +15,12 @@ from pyomo.core import Block, Constraint, Set, Var
 from pyomo.core.base.block import BlockData
 
 from pyomo_fesd.core import GENERATED, exchanged, index_tuple, insert, sum_of, switched_systems
+from pyomo_fesd.dcs.blended_copies import BlendedCopies, can_be_copied
 from pyomo_fesd.dcs.continuation import Continuation
 from pyomo_fesd.dcs.forms import heaviside
-from pyomo_fesd.dcs.reading import split
+from pyomo_fesd.dcs.reading import RecognisedSystem, split
 from pyomo_fesd.dcs.source_maps import source_maps
+from pyomo_fesd.dcs.weights import Weights
 
 
 def dcs_block(parent: BlockData) -> BlockData:
@@ -25,32 +28,58 @@ def dcs_block(parent: BlockData) -> BlockData:
     return _below(parent, GENERATED + 'dcs')
 
 
-def blend(system, form, defined) -> Callable:
-    """Write one Disjunction at one time, and deactivate the source.
+class Blender:
+    """Writes Disjunctions, each at one time; one that is built like another one becomes a copy of what was written for it.
 
     Parameters
     ----------
-    system : ModeSystem or HysteresisSystem
-    form : module of ``forms``, or None where one mode is left
     defined : ComponentMap VarData -> DisjunctionData
         receives the variables that the modes define
-
-    Returns
-    -------
-    callable
-        the sum of the multipliers of some modes, given by their numbers
     """
-    block, index, parts = _form_block(system, form), index_tuple(system.disjunction.index()), system.parts()
 
-    # for a single Disjunction at one time, functools.cache takes longer to set up than it saves
-    weights = {}
+    def __init__(self, defined):
+        self._defined, self._copies, self._blocks = defined, {}, {}
 
-    def weight(modes):
-        modes = tuple(modes)
-        if modes not in weights:
-            weights[modes] = 1.0 if len(modes) == len(system.modes) else form.weight(block, index, system, modes)
-        return weights[modes]
+    def blend(self, system, form) -> Callable:
+        """Write one Disjunction at one time, and deactivate the source.
 
+        Parameters
+        ----------
+        system : ModeSystem, RecognisedSystem or HysteresisSystem
+        form : module of ``forms``, or None where one mode is left
+
+        Returns
+        -------
+        callable
+            the sum of the multipliers of some modes, given by their numbers
+        """
+        block, index, parts = self._block(system, form), index_tuple(system.disjunction.index()), system.parts()
+        # the analyses keep the first ones, so that no other one gets its id
+        like = id(system.first) if isinstance(system, RecognisedSystem) else None
+        if like in self._copies:
+            weight = self._copies[like].write(block, index, system, parts)
+        else:
+            weight = _blend(block, index, system, form, parts)
+            if like is not None and can_be_copied(system):
+                self._copies[like] = BlendedCopies(block, index, system, form)
+        for v in system.defined:
+            self._defined[v] = system.disjunction
+        _deactivate(block, system, parts)
+        return weight
+
+    def _block(self, system, form):
+        """The block for one form of one Disjunction; that of Disjunctions that are built alike is sought once."""
+        if not isinstance(system, RecognisedSystem):
+            return _form_block(system, form)
+        key = id(system.disjunction.parent_component()), id(system.first)
+        if key not in self._blocks:
+            self._blocks[key] = _form_block(system, form)
+        return self._blocks[key]
+
+
+def _blend(block, index, system, form, parts):
+    """Write the multipliers and the blended equations; returns the weights of modes."""
+    weight = Weights(block, index, system, form)
     if form is None:
         _impose_only_mode(block, index, system)
     else:
@@ -58,9 +87,6 @@ def blend(system, form, defined) -> Callable:
         _add_blended_equations(block, index, system, weight, Continuation(block, _index_sets(system), index, system, form))
         _record_multipliers(block, parts, weight)
         _record_sources_of_form(block, index, system, form)
-        for v in system.equations.defined:
-            defined[v] = system.disjunction
-    _deactivate(block, system, parts)
     return weight
 
 

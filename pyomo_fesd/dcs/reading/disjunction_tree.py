@@ -80,7 +80,13 @@ def active_constraints(disjunct) -> list:
     if Block in disjunct._ctypes:
         return list(disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
     # most disjuncts hold a few Constraints, and there is one at every time: Pyomo's walk takes longer than all the rest
-    return [data for c in declared(disjunct, CONSTRAINTS) if c.active for data in data_of(c) if data.active]
+    found = []
+    for component in declared(disjunct, CONSTRAINTS):
+        if component.is_indexed():
+            found += [data for data in data_of(component) if data.active] if component.active else ()
+        elif component.active and len(component):
+            found.append(component)
+    return found
 
 
 def enclosing_disjunct(component):

@@ -87,7 +87,7 @@ def refuse_twice_defined(systems, known) -> None:
     """
     owners = ComponentMap(known)
     for system in systems:
-        for v in system.equations.defined if system.equations is not None else ():
+        for v in system.defined:
             if v in owners:
                 raise FesdError(
                     v,

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import chain
 from typing import NamedTuple
 
@@ -16,8 +17,8 @@ from pyomo_fesd.dcs.reading.regions import Regions, conditions, read_regions
 
 
 @dataclass(frozen=True)
-class ModeSystem:
-    """One DisjunctionData as a system of modes.
+class System:
+    """One DisjunctionData with its modes.
 
     Attributes
     ----------
@@ -25,19 +26,10 @@ class ModeSystem:
         the Disjunction with those nested in it
     modes : list of Mode
         the modes that can be active (a deactivated disjunct or one whose indicator is fixed to False is left out)
-    regions : Regions or None
-        None also where the regions may overlap (hysteresis)
-    equations : ModeEquations or None
-        both None where only one mode is left, whose constraints are imposed as they are
-    laws : list of lists of Law
-        by mode, how its right-hand sides (or its equations, where it is implicit) are continued outside of its region
     """
 
     tree: DisjunctionTree
     modes: list
-    regions: Regions | None
-    equations: ModeEquations | None
-    laws: list
 
     @property
     def disjunction(self):
@@ -51,6 +43,30 @@ class ModeSystem:
             for disjunct in mode.disjuncts:
                 numbers.setdefault(id(disjunct), []).append(i)
         return [(disjunct, numbers.get(id(disjunct), [])) for disjunct in self.tree.disjuncts()]
+
+
+@dataclass(frozen=True)
+class ModeSystem(System):
+    """One DisjunctionData as a system of modes.
+
+    Attributes
+    ----------
+    regions : Regions or None
+        None also where the regions may overlap (hysteresis)
+    equations : ModeEquations or None
+        both None where only one mode is left, whose constraints are imposed as they are
+    laws : list of lists of Law
+        by mode, how its right-hand sides (or its equations, where it is implicit) are continued outside of its region
+    """
+
+    regions: Regions | None
+    equations: ModeEquations | None
+    laws: list
+
+    @property
+    def defined(self) -> list:
+        """The variables that the modes define."""
+        return [] if self.equations is None else self.equations.defined
 
 
 @dataclass(frozen=True)
@@ -73,6 +89,46 @@ class _Stated(NamedTuple):
     inequalities: list
     key: tuple | None = None
     parts: Sequence = ()
+
+
+@dataclass(frozen=True)
+class RecognisedSystem(System):
+    """One DisjunctionData that is built like another one; has all that a ``ModeSystem`` has, made when it is asked for.
+
+    Attributes
+    ----------
+    first : ModeSystem
+        that of the other one
+    stamp : Stamp
+        from its components to those of others
+    stated : _Stated
+        its own components and constraints
+    """
+
+    first: ModeSystem
+    stamp: Stamp
+    stated: _Stated
+
+    @property
+    def laws(self) -> list:
+        """Those of the other one, which do not contain its components."""
+        return self.first.laws
+
+    @property
+    def defined(self) -> list:
+        """The variables that the modes define."""
+        return [self.stated.parts[self.stamp.place(v)] for v in self.first.equations.defined]
+
+    @cached_property
+    def regions(self) -> Regions:
+        """The regions, in expressions of its own components."""
+        functions, geometry = self.first.regions.functions, self.first.regions.geometry
+        return Regions([self.stamp.expression(c, self.stated.parts) for c in functions], geometry)
+
+    @cached_property
+    def equations(self) -> ModeEquations:
+        """The equations, in expressions of its own components."""
+        return self.first.equations.stamped(self.stamp, self.stated.parts, self.stated.equalities)
 
 
 @dataclass(frozen=True)
@@ -107,7 +163,7 @@ class SystemReader:
         self._variables, self._times, self._own = variables, times, {}
         self._patterns, self._choices, self._read = analyses.patterns, analyses.choices, analyses.systems
 
-    def recognise(self, tree, modes) -> ModeSystem | None:
+    def recognise(self, tree, modes) -> RecognisedSystem | None:
         """Return the ``modes`` that are left of a tree where others that are built alike were read before, else None.
 
         These contain no operations that ``expression_key`` does not know, such as piecewise functions.
@@ -120,11 +176,9 @@ class SystemReader:
             return None
         refuse_contents(tree, modes)
         self._refuse_foreign(tree, modes, stated)
-        regions = Regions([stamp.expression(c, stated.parts) for c in first.regions.functions], first.regions.geometry)
-        equations = first.equations.stamped(stamp, stated.parts, stated.equalities)
-        return ModeSystem(tree, modes, regions, equations, first.laws)
+        return RecognisedSystem(tree, modes, first, stamp, stated)
 
-    def read(self, tree, modes) -> ModeSystem:
+    def read(self, tree, modes) -> ModeSystem | RecognisedSystem:
         """Read the ``modes`` that are left of a tree; the model is not changed."""
         known = self.recognise(tree, modes)
         if known is not None:
