@@ -17,12 +17,13 @@ Does not apply: to models that were discretised before.
 from functools import cache
 
 import numpy as np
+from pyomo.core import Var
 from pyomo.dae import ContinuousSet, DerivativeVar
 from pyomo.dae.misc import generate_finite_elements
 from pyomo.dae.plugins.colloc import Collocation_Discretization_Transformation
 from scipy.special import roots_jacobi, roots_legendre
 
-from pyomo_fesd.core import stored_index, weighted_sum
+from pyomo_fesd.core import stored_index, variable_at, weighted_sum
 
 
 @cache
@@ -62,6 +63,7 @@ class Collocation(Collocation_Discretization_Transformation):
         self._place_points(wrt, elements, tau)
         rates = self._adot[currentds], self._adotdot[currentds]
         _read_states_directly(block, wrt)
+        _make_variables(block, wrt)
         self._scheme = [_Scheme(wrt, elements, order, rate) for order, rate in enumerate(rates, start=1)]
         self._tau[currentds] = []
         super()._transformBlock(block, currentds)
@@ -104,6 +106,17 @@ def _read_states_directly(block, wrt):
         if len(over) == 1 and over[0] is wrt:
             x = derivative.get_state_var()
             derivative.set_derivative_expression(lambda *index, x=x: x[stored_index(index)])
+
+
+def _make_variables(block, wrt):
+    """Make the variables at the new points, in the order of pyomo.dae, which searches ``wrt`` for each of them."""
+    for variable in block.component_objects((Var, DerivativeVar), descend_into=True):
+        rules = (variable._rule_init, variable._rule_bounds, variable._rule_domain)
+        # rules that are functions may need components that are not expanded yet
+        whole = variable.index_set() is wrt and not variable.is_reference()
+        if whole and all(rule is None or rule.constant() for rule in rules):
+            for t in set(wrt) - set(variable._data):
+                variable_at(variable, (t,))
 
 
 class _Scheme:

@@ -316,9 +316,16 @@ def _describe_boundaries(moving):
     add_arrivals(moving)
 
 
+def _has_variables(place):
+    """Whether a block may have variables; the indicator of a disjunct that is replaced is in no equation."""
+    types = place._ctypes
+    only_indicator = place.ctype is Disjunct and types[Var][2] == 1 and Block not in types and Disjunct not in types
+    return not only_indicator or place.transformation_block is None
+
+
 def _relate_variables(moving, switching):
     """Tell the solver which variables are one quantity over time, and have one size, and which belong to one element."""
-    variables = own_components(moving.block.model(), Var, descend_into=(Block, Disjunct))
+    variables = own_components(moving.block.model(), Var, descend_into=(Block, Disjunct), enter=_has_variables)
     families = list(TimeIndex(moving.wrt).families_in(variables).values())
     homotopy_hints(moving.block).alike += [tuple(family.values()) for family in families]
     if switching:
