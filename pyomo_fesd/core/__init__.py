@@ -55,7 +55,7 @@ from pyomo_fesd.core.homotopy_hints import (
     all_hints,
     homotopy_hints,
 )
-from pyomo_fesd.core.insertion import insert, variable_at
+from pyomo_fesd.core.insertion import add_copies, insert, variable_at
 from pyomo_fesd.core.instants import Instant
 from pyomo_fesd.core.interpolation import interpolation_weights
 from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible

@@ -8,6 +8,8 @@ Leaves: the content, or the variable.
 Does not apply: to an index that a user gives.
 """
 
+from collections.abc import Iterable
+
 from pyomo.core.base.component import ComponentData
 from pyomo.core.base.indexed_component import IndexedComponent
 
@@ -17,6 +19,17 @@ from pyomo_fesd.core.time_index import stored_index
 def insert(component: IndexedComponent, index: tuple, content) -> ComponentData:
     """Add ``content`` at ``index`` and return its data."""
     return component._setitem_when_not_present(stored_index(index), content)
+
+
+def add_copies(component: IndexedComponent, indices: Iterable) -> None:
+    """Make the data of a Var whose rules are constant at ``indices`` without data: the first by its rules, the others after it."""
+    first = None
+    for index in indices:
+        if first is None:
+            first = component._getitem_when_not_present(index)
+            continue
+        data = component._data[index] = first.copy(first)
+        data._index = index
 
 
 def variable_at(component: IndexedComponent, index: tuple) -> ComponentData:

@@ -23,7 +23,7 @@ from pyomo.dae.misc import generate_finite_elements
 from pyomo.dae.plugins.colloc import Collocation_Discretization_Transformation
 from scipy.special import roots_jacobi, roots_legendre
 
-from pyomo_fesd.core import stored_index, variable_at, weighted_sum
+from pyomo_fesd.core import add_copies, stored_index, weighted_sum
 
 
 @cache
@@ -109,14 +109,13 @@ def _read_states_directly(block, wrt):
 
 
 def _make_variables(block, wrt):
-    """Make the variables at the new points, in the order of pyomo.dae, which searches ``wrt`` for each of them."""
+    """Make the variables at the new points, in the order of pyomo.dae, which calls their rules for each of them."""
     for variable in block.component_objects((Var, DerivativeVar), descend_into=True):
         rules = (variable._rule_init, variable._rule_bounds, variable._rule_domain)
         # rules that are functions may need components that are not expanded yet
         whole = variable.index_set() is wrt and not variable.is_reference()
         if whole and all(rule is None or rule.constant() for rule in rules):
-            for t in set(wrt) - set(variable._data):
-                variable_at(variable, (t,))
+            add_copies(variable, set(wrt) - set(variable._data))
 
 
 class _Scheme:
