@@ -106,15 +106,16 @@ class BlendedCopies:
 
     def _write_rows(self, block, index, system, built):
         """Write the rows with the contents that come next in ``built``, and their sources."""
-        maps, equations = source_maps(block), list(chain(*system.stated.equalities))
+        maps, disjunction, modes = source_maps(block), system.disjunction, system.modes
+        equations = list(chain(*system.stated.equalities))
         for name, rest, is_pair, sources, mode in self._rows:
             content = complements(next(built), next(built)) if is_pair else next(built)
             row = insert(block.component(name), (*index, *rest), content)
-            maps.disjunction[row] = system.disjunction
+            maps.disjunction[row] = disjunction
             if sources is not None:
                 maps.connect(row, [equations[k] for k in sources])
-            if mode is not None and len(system.modes[mode].innermost) == 1:
-                (maps.disjunct[row],) = system.modes[mode].innermost
+            if mode is not None and len(modes[mode].innermost) == 1:
+                (maps.disjunct[row],) = modes[mode].innermost
 
 
 def _at(component, index):

@@ -14,7 +14,16 @@ from pyomo.core import Constraint, ConstraintList, RangeSet, Set, quicksum
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import Follower, MovingGrid, all_switched_systems, homotopy_hints, insert, is_generated, leaves_of
+from pyomo_fesd.core import (
+    Follower,
+    MovingGrid,
+    all_switched_systems,
+    expression_key,
+    homotopy_hints,
+    insert,
+    is_generated,
+    leaves_of,
+)
 from pyomo_fesd.finite_elements.mixed_complementarity import repeats_other_side
 from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
 
@@ -92,7 +101,7 @@ def _pairs(condition, element, form) -> Iterator[tuple]:
 
 def _add_signs(moving):
     """G >= 0 and H >= 0 at every point and after every jump, where the bounds of the variables do not imply it."""
-    block, bounds = moving.block, ExpressionBoundsVisitor()
+    block, bounds = moving.block, _LowerBounds()
     block.nonnegative = moving.nonnegative = ConstraintList()
     block.sign_after = moving.sign_after = Constraint(block.condition, block.element, [1, 2])
     for condition in moving.complementarities:
@@ -112,8 +121,22 @@ def _never_negative(expr, bounds):
         return not _may_change(low) and not _may_change(high) and low is not None and low >= 0
     if any(leaf.is_parameter_type() or (leaf.is_variable_type() and _bounds_may_change(leaf)) for leaf in leaves_of(expr)):
         return False
-    low, _ = bounds.walk_expression(expr)
+    low = bounds.of(expr)
     return low is not None and low >= 0
+
+
+class _LowerBounds:
+    """Lower bounds of expressions; of those that are built alike from variables with the same bounds one is determined."""
+
+    def __init__(self):
+        self._visitor, self._known = ExpressionBoundsVisitor(), {}
+
+    def of(self, expr):
+        """Return the lower bound that the bounds of the variables imply."""
+        key, _ = expression_key([expr], lambda v: (v.lower, v.upper))
+        if key is None or key not in self._known:
+            self._known[key], _ = self._visitor.walk_expression(expr)
+        return self._known[key]
 
 
 def _bounds_may_change(v):

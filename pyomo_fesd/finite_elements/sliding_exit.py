@@ -18,10 +18,10 @@ Does not apply: with one collocation point, whose polynomial has no slope; at bo
 """
 
 import numpy as np
-from pyomo.core import Constraint, Expression, quicksum
+from pyomo.core import Constraint, Expression
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import BranchConstraint, MovingGrid, homotopy_hints, insert, interpolation_weights, weighted_sum
+from pyomo_fesd.core import BranchConstraint, MovingGrid, homotopy_hints, insert, interpolation_weights, sum_of, weighted_sum
 from pyomo_fesd.finite_elements.equilibration import TINY
 
 #: H'(0), relative to the sum of its terms' sizes, below which H leaves zero without a slope.
@@ -51,7 +51,7 @@ def add_sliding_exits(moving: MovingGrid) -> None:
 def _add_exit_condition(block, condition, e, f, slope, end):
     """Add the exit of one time complementarity at the boundary between elements e and f."""
     index, values = (condition.name, e.n), [condition.sides[t][0] for t in e.points]
-    G = quicksum(weight * value for weight, value in zip(end, values) if weight)
+    G = sum_of([weight * value for weight, value in zip(end, values) if weight])
     H = [condition.starts.get(f.n, condition.sides[f.left])[1], *(condition.sides[t][1] for t in f.points)]
     block.slope[index] = 1 - _relative_slope(slope, H) / FLAT
     flat = _positive(block.slope[index])

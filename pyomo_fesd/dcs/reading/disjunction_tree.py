@@ -158,7 +158,8 @@ class Nesting:
     def tree(self, disjunction) -> DisjunctionTree:
         """Return the tree of an outermost Disjunction."""
         nested = list(self._below(disjunction))
-        for d in (disjunction, *nested):
+        _refuse_inclusive_or(disjunction)
+        for d in nested:
             _refuse_inclusive_or(d)
             if self._times.time(d) != self._times.time(disjunction):
                 raise FesdError(d, f"it is nested in '{disjunction.name}', which is of another time", "nest modes of one time")
@@ -178,10 +179,13 @@ class Nesting:
         if not possible:
             raise FesdError(disjunction, "all its disjuncts are switched off", "activate one, or deactivate the Disjunction")
         for disjunct in possible:
-            for paths in product(*(self._modes(inner, with_hysteresis) for inner in self._inside.get(disjunct, ()))):
+            if disjunct not in self._inside:
+                # most have none; there is one at every time, and the product takes longer than all the rest
+                yield Mode((disjunct,), (disjunct,))
+                continue
+            for paths in product(*(self._modes(inner, with_hysteresis) for inner in self._inside[disjunct])):
                 below = chain(*(path.disjuncts for path in paths))
-                ends = tuple(chain(*(path.innermost for path in paths)))
-                yield Mode((disjunct, *below), ends or (disjunct,))
+                yield Mode((disjunct, *below), tuple(chain(*(path.innermost for path in paths))))
 
 
 def _is_possible(disjunction, disjunct, with_hysteresis):
