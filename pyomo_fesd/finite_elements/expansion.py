@@ -194,7 +194,7 @@ def _is_simple(component, wrt):
 def _make_missing(disjunct):
     """Make the missing data of a Disjunct by its rule."""
     for index in disjunct.index_set():
-        if index not in disjunct:
+        if index not in disjunct._data:
             # what ``disjunct[index]`` calls when it has searched the index set
             disjunct._getitem_when_not_present(index)
 
