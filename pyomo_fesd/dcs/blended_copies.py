@@ -119,8 +119,9 @@ class BlendedCopies:
 
 
 def _at(component, index):
-    """The data of a component whose index begins with ``index``, in the order in which they were made."""
-    return [data for key, data in component._data.items() if index_tuple(key)[: len(index)] == index]
+    """The data of a component whose index begins with ``index``, in the order of the rest, in which forms make them."""
+    found = {index_tuple(key): data for key, data in component._data.items()}
+    return [found[key] for key in sorted(key for key in found if key[: len(index)] == index)]
 
 
 def _name_and_rest(data, index):
