@@ -172,9 +172,7 @@ def test_switching_functions_in_other_units_are_divided_by_their_own(alone):
         m.f, m.g = pyo.Var(m.t, initialize=1), pyo.Var(m.t, initialize=1)
         pyo.TransformationFactory('dae.finite_difference').apply_to(m, wrt=m.t, nfe=3, scheme='BACKWARD')
         for name, x, f in (('long', m.a, m.f), ('heavy', m.b, m.g)):
-            m.add_component(
-                name, Disjunction(m.t, rule=lambda m, t, x=x, f=f: [[x[t] <= 0, f[t] == 3], [x[t] >= 0, f[t] == 1]])
-            )
+            m.add_component(name, Disjunction(m.t, rule=lambda m, t, x=x, f=f: [[x[t] <= 0, f[t] == 3], [x[t] >= 0, f[t] == 1]]))
         return m
 
     m = dcs(build())
