@@ -30,11 +30,12 @@ def second_plan(levels):
     return m, controller.step({m.component(name): number for name, number in MEASURED.items()})
 
 
-def test_levels_leave_a_local_plan_that_keeps_the_pressure_far_too_high():
-    _, poor = second_plan(levels=None)
-    m, answer = second_plan(levels=5)
-    assert poor.certified and poor.objective > 20
-    assert answer.certified and answer.objective < 1
+@pytest.mark.parametrize('levels', [None, 5])
+def test_a_local_plan_that_keeps_the_pressure_far_too_high_is_left(levels):
+    # without levels 30.6, certified, was the end where nothing but small steps led on; with levels 0.652 was, and the search now
+    # goes on from there to 0.644, where an order of switches stays open
+    m, answer = second_plan(levels=levels)
+    assert answer.objective < 0.66
     found = {t: m.P[t].value for t in (2, 4, 10)}
     simulate(m, m.t, inputs=[m.u])
     assert {t: m.P[t].value for t in found} == pytest.approx(found, rel=1e-3)

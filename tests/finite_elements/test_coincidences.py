@@ -11,7 +11,7 @@ import pyomo_fesd
 from pyomo_fesd.core import all_hints, moving_grids
 from pyomo_fesd.finite_elements.changes import switching_together
 from tests.models import dcs
-from tests.problems import carried, events_together, kink_at_stage, landing_at_stage, two_experiments
+from tests.problems import carried, events_together, impact_at_stage, kink_at_stage, landing_at_stage, two_experiments
 from tests.problems.running import move, transform
 
 
@@ -265,3 +265,19 @@ def test_a_landing_at_a_stage_is_certified_where_nothing_can_move_it():
     m = landing_at_stage.Landing(3, 1, 2).solved(4)
     m.theta.fix(1)
     assert pyomo_fesd.certify(m).certified
+
+
+# An impact on the boundary of a control stage, after which the bodies part; where it comes earlier they stay together until then
+
+
+@pytest.mark.parametrize('nfe', [4, 6])
+def test_an_impact_at_a_stage_is_not_certified_where_a_slope_descends(nfe):
+    found = []
+    for seed in range(12):
+        impact = impact_at_stage.Impact.draw(seed)
+        if min(map(abs, impact.slopes)) > CLEAR:
+            m = impact.simulated(nfe)
+            assert pyo.value(m.cost) == pytest.approx(impact.objective(1), abs=1e-7)
+            found.append((pyomo_fesd.certify(m).certified, min(impact.slopes) > 0))
+    assert {minimum for _, minimum in found} == {False, True}
+    assert all(minimum for certified, minimum in found if certified)

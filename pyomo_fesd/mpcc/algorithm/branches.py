@@ -7,7 +7,7 @@ from collections import Counter, deque
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, FIRST, SECOND, BranchSolutions
+from pyomo_fesd.mpcc.algorithm.branch_solutions import FIRST, SECOND, BranchSolutions
 from pyomo_fesd.mpcc.algorithm.neighbours import Neighbours
 from pyomo_fesd.mpcc.algorithm.search import FEW, Verdict, exhaust, leaves
 from pyomo_fesd.mpcc.algorithm.state import Point
@@ -17,6 +17,8 @@ from pyomo_fesd.mpcc.subproblems import MATTERS, Stationarity
 PROGRESS = 1e-8
 #: So much in a neighbouring branch, where a place of least extent gives a little less to each one that takes it over.
 WORTH = 1e-6
+#: A point without places of least extent may cost this much more, relative: the error of uneven ones, of any order.
+UNEVEN = 1e-2
 #: So much from a point whose branch NLP did not end: smaller steps only go on in a branch that Ipopt cannot finish.
 UNFINISHED = 1e-3
 #: Attempts at a branch NLP before it counts as infeasible.
@@ -52,7 +54,7 @@ class Branches:
     def __init__(self, subsolves, gap, global_lpec, patient=False):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
-        self._attempts, self._solved, self._exhausted = Counter(), {}, {}
+        self._attempts, self._solved, self._exhausted, self._left_out = Counter(), {}, {}, set()
         self._patient = patient
         self.solutions, self.neighbours = BranchSolutions(subsolves, at_once=patient), Neighbours(subsolves)
 
@@ -157,14 +159,27 @@ class Branches:
         return next(self._beside_short(point, point.f - PROGRESS * max(1.0, abs(point.f))), None)
 
     def with_fewer_short(self, point):
-        """A certified point that is as good as ``point``, in such a branch, with fewer variables at their lower bound; or None.
+        """A certified point in such a branch, or in one without any of them, with fewer variables at their lower bound; or None.
 
-        Orders of changes beside a place of least extent may not be known.
+        Orders of changes beside a place of least extent may not be known.  The others are not evenly distributed beside it, and the
+        objective has the error of that: the point counts if it is as good but for ``UNEVEN``.  Each branch is tried once.
         """
+        return self._with_fewer_short(point, point.f + UNEVEN * max(1.0, abs(point.f)))
+
+    def _with_fewer_short(self, point, enough):
         number = self.neighbours.number_of_short(point.w)
-        others = self._beside_short(point, point.f + AS_GOOD * max(1.0, abs(point.f)))
-        fewer = (other for other in others if self.neighbours.number_of_short(other.w) < number)
-        return next((other for other in fewer if other.certificate.certified), None)
+        for zero in self.neighbours.with_fewer_short(point):
+            if zero.tobytes() in self._left_out:
+                continue
+            self._left_out.add(zero.tobytes())
+            end = self.improve_from(self.solutions.certified(point.w, zero, max_iter=SECOND, below=enough, enough=enough), True)
+            if end is None or self.neighbours.number_of_short(end.w) >= number:
+                continue
+            if end.certificate.grade is Stationarity.LIMITED:
+                end = self._with_fewer_short(end, enough)
+            if end is not None and end.certificate.certified:
+                return end
+        return None
 
     def _beside_short(self, point, enough):
         """Yield the solutions, of at most ``enough``, of the neighbouring branches for each variable at its lower bound."""

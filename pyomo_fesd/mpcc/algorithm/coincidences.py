@@ -44,24 +44,50 @@ class Coincidences:
 
     def settle(self):
         """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
-        while self.run.point is not None and self.run.point.certificate.certified and self._c.has_objective:
+        while self.run.point is not None and self._c.has_objective:
             before = self.run.point
+            if not before.certificate.certified:
+                if before.certificate.grade is not Stationarity.LIMITED or not self._leads_on(before):
+                    return
+                continue
             # until all orders are settled any certified point is better
             self.run.point = replace(before, certificate=replace(before.certificate, grade=Stationarity.OPEN))
             found = self._outcome(before)
-            other = self._branches.with_fewer_short(before) if found is OPEN else None
-            if other is not None:
-                self.run.point = other
+            if found is OPEN and self._takes_fewer_short(before):
                 continue
             if found is SETTLED:
                 self.run.point = self._settled = before
             elif found is not OPEN:
-                self._branches.improve_from(found, True)
-                if not self.run.point.certificate.certified:
-                    # a better point may have changes that leave at the other end, or beside a place at its lower bound
-                    self._branches.try_neighbours()
+                self._go_on(found)
             if found in (SETTLED, OPEN):
                 return
+
+    def _go_on(self, found):
+        """Descend from a better point in another order."""
+        self._branches.improve_from(found, True)
+        if not self.run.point.certificate.certified:
+            # it may have changes that leave at the other end, or beside a place at its lower bound
+            self._branches.try_neighbours()
+
+    def _leads_on(self, point):
+        """Whether there is a point to go on from, where only places of least extent keep the incumbent from descending.
+
+        Such a place is to be passed by: the change beside it would happen earlier, or later.
+        """
+        sets = self._subsolves.sets(point.w, self._tolerances.biactive)
+        for order in self._orders.at(point, sets):
+            found = self._grown(point, order.ways)
+            if found is not None:
+                self._go_on(found)
+                return True
+        return self._takes_fewer_short(point)
+
+    def _takes_fewer_short(self, point):
+        """Whether there is a point with fewer places of least extent, or a better one on the way, which is the incumbent now."""
+        before, other = self.run.point, self._branches.with_fewer_short(point)
+        if other is not None:
+            self.run.point = other
+        return self.run.point is not before
 
     def mark_untried(self):
         """Mark the incumbent as open if it is certified, and has orders that were not tried as a limit came before."""
@@ -82,14 +108,17 @@ class Coincidences:
         if not self._c.has_objective:
             return certificate
         nlp = NlpResult(w, self._c.evaluate(w).f, 'given', 0, np.zeros(0), np.zeros(0))
-        found = self._outcome(Point(nlp, nlp.f, certificate))
+        found = self._outcome(Point(nlp, nlp.f, certificate), goes_on=False)
         if found is SETTLED:
             return certificate
         return replace(certificate, grade=Stationarity.OPEN if found is OPEN else Stationarity.DESCENT)
 
-    def _outcome(self, point):
-        """A better point; or whether all orders are settled."""
-        tried, outcome = set(), SETTLED
+    def _outcome(self, point, goes_on=True):
+        """A better point; or whether all orders are settled.
+
+        Where the run ``goes_on`` the point may also be one that no small step leads to.
+        """
+        outcome = SETTLED
         if self._is_flat(point):
             return SETTLED
         better = self._branches.without_short(point)
@@ -100,10 +129,7 @@ class Coincidences:
             return OPEN
         possible = []
         for order in self._orders.at(point, sets):
-            if order.key is not None and order.key in tried:
-                continue
-            tried.add(order.key)
-            found = self._order(point, order, possible)
+            found = self._order(point, order, possible, goes_on)
             if found is OPEN:
                 outcome = OPEN
             elif found is not SETTLED:
@@ -117,7 +143,7 @@ class Coincidences:
         verdicts = (self._orders.judged(point, sets, row) for row in rows(possible))
         return SETTLED if all(verdict in SETTLING for verdict in verdicts) else OPEN
 
-    def _order(self, point, order, possible):
+    def _order(self, point, order, possible, goes_on=True):
         """A better point in an order; or its outcome.  What it inserts is appended to ``possible`` if that is possible."""
         verdicts = set()
         for judge in order.judges:
@@ -129,6 +155,9 @@ class Coincidences:
         if verdicts & SETTLING:
             return SETTLED
         inserts = bool(verdicts - {Verdict.NONE})
+        better = self._grown(point, order.ways) if inserts and goes_on else None
+        if better is not None:
+            return better
         found = self._first(partial(self._try, point, inserts), order.ways)
         if found is SETTLED and Verdict.DESCENT in verdicts:
             # a spare place is known to the tolerances of its NLP only: a slide with rates of round-off seems to have no room
@@ -166,6 +195,19 @@ class Coincidences:
         with self._c.vanishing(way.extents):
             found = self._without_extent(point, inserts, way)
         return found if isinstance(found, str) else self._better(point, *found)
+
+    def _grown(self, point, ways):
+        """The first better point in the branches of some ways, from their places as they are; or None.
+
+        Where places have no extent, what they hold is not determined, and an NLP with them at 0 may not end at all.
+        """
+        for way in ways:
+            start = way.start.copy()
+            start[way.extents] = point.w[way.extents]
+            found = self._better(point, (start,), way.zero)
+            if found is not OPEN:
+                return found
+        return None
 
     def _without_extent(self, point, inserts, way):
         """The outcome of a way whose places have no extent; or starts and zero sides of a branch that may be better."""

@@ -28,9 +28,9 @@ CYCLES, PROGRESS = 6, 1e-3
 #: one misses.
 PATHS = {'auto': (('scholtes', 1.0), ('elastic', 1.0))}
 LOOSER = (1.0, 10.0)
-#: A further path is followed where the relaxations around the best point have an objective that is smaller by the first part, or
-#: the path before went astray: the second part of its relaxations did not reach their solutions, or one was infeasible.
-GAP, ASTRAY = 0.5, 0.5
+#: A further path is followed where the relaxations around the best point have an objective that is smaller by this part, or one of
+#: the path before was infeasible.
+GAP = 0.5
 #: With more than this part of the pairs undecided a relaxation names no branch.
 UNDECIDED = 0.5
 #: Part of the time limit after which no further round begins: the best point is certified in the rest.
@@ -40,8 +40,9 @@ SHARE = 0.6
 LONGER, LEAST_TIME = 2.0, 10.0
 #: Branch NLPs from one relaxation: one that stops on its way has better values of the free variables, but perhaps the wrong branch.
 ATTEMPTS = 2
-#: Two relaxations with objectives as close as this, relative, have the same solution.
-SAME = 1e-8
+#: Two relaxations with objectives as close as this, relative, have the same solution; and so have two branches, whose bi-active
+#: pairs may have either side.
+SAME, SAME_BRANCH = 1e-8, 1e-5
 #: Products of eps carry round-off.
 ROUND_OFF = 1.001
 
@@ -70,13 +71,12 @@ class Completions:
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
         for form, looser in self._paths:
             self._form, self._best, self._share = form, None, 1.0
-            solved, is_infeasible = self._down(start, self._options.eps_init * looser)
+            is_infeasible = self._down(start, self._options.eps_init * looser)
             if is_infeasible and (form, looser) != self._paths[-1]:
                 # it led away from all solutions: the next path has more to go on from
                 continue
             self._improve()
-            is_astray = is_infeasible or solved.count(False) >= ASTRAY * len(solved)
-            if not self._possible or not (is_astray or self._promising()) or self._deadline.expired():
+            if not self._possible or not (is_infeasible or self._promising()) or self._deadline.expired():
                 break
         if self.run.point is not None:
             self._certify()
@@ -84,20 +84,20 @@ class Completions:
     def _down(self, w, eps):
         """Rounds with ever smaller eps, each from the relaxation before.
 
-        Returns whether each reached its solution, and whether the last one ended as infeasible.  The points of a relaxation with a
-        smaller eps are among those of one before: after an infeasible one there is none.
+        They end where two in a row lead to the same branch: those around its solution lead on from it.  Returns whether one is
+        infeasible: the points of a relaxation with a smaller eps are among those of one before, so after it there is none.
         """
-        solved = []
-        least = max(LAST, self._options.eps_final)
+        least, before = max(LAST, self._options.eps_final), None
         while eps * ROUND_OFF >= least and not self._deadline.expired():
             is_last = eps * self._options.eps_factor * ROUND_OFF < least
-            relaxed = self._round(w, eps, is_on_the_way=not is_last)
-            solved.append(relaxed.solved)
+            relaxed, end = self._round(w, eps, is_on_the_way=not is_last)
             if relaxed.status in INFEASIBLE:
-                return solved, True
-            w = relaxed.w
+                return True
+            if None not in (before, end) and abs(end - before) <= SAME_BRANCH * abs(before):
+                return False
+            w, before = relaxed.w, end
             eps *= self._options.eps_factor
-        return solved, False
+        return False
 
     def _improve(self):
         """Rounds around the best point of the path, until they no longer find a much better one."""
@@ -130,12 +130,13 @@ class Completions:
         return relaxed.status not in INFEASIBLE and undecided <= UNDECIDED * self._c.pairs
 
     def _round(self, w, eps, is_on_the_way=False):
-        """One relaxation from ``w``, and the branch of its completion, unless it is known; returns the relaxation's result.
+        """One relaxation from ``w``, and the branch of its completion, unless it is known.
 
+        Returns the relaxation's result, and the objective of the branch, None without one.
         Where a completion stops on its way, the other sides are those of the relaxation: on the way to smaller eps it is only worth
         a branch if it names one.
         """
-        self.run.eps = eps
+        self.run.eps, end = eps, None
         began = time.perf_counter()
         relaxed = self._subsolves.relax(self._form, w, eps, None, int(self._share * self._options.relaxation_iterations))
         self._share = BUDGET if relaxed.stopped else self._share
@@ -144,9 +145,9 @@ class Completions:
             self._promise = self._c.evaluate(relaxed.w).f
         if not self._is_known(relaxed):
             seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
-            self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))
+            end = self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))
         self._after(self.run)
-        return relaxed
+        return relaxed, end
 
     def _is_known(self, relaxed):
         """Whether a relaxation before had the same solution."""
@@ -156,10 +157,10 @@ class Completions:
         return is_known
 
     def _explore(self, w, seconds, to_the_end):
-        """Solve the branch of the completion of ``w`` without guide bounds."""
+        """Solve the branch of the completion of ``w`` without guide bounds; returns its objective."""
         narrow = self._c.widen()
         try:
-            self._branch_of_completion(w, seconds, to_the_end)
+            return self._branch_of_completion(w, seconds, to_the_end)
         finally:
             if narrow:
                 self._c.narrow()
@@ -167,22 +168,25 @@ class Completions:
     def _branch_of_completion(self, w, seconds, to_the_end=False):
         """Solve the branch that the completion of ``w`` names; where that stops on its way, the completion of its end once more.
 
-        With ``to_the_end`` only one that is complete names a branch.
+        With ``to_the_end`` only one that is complete names a branch.  Returns the objective, None without a solution.
         """
+        end = None
         for _ in range(ATTEMPTS):
             completed, is_complete, note = self._complete(w, seconds)
             self._subsolves.note(note, completed)
             self._possible = self._possible or is_complete
             if to_the_end and not is_complete:
-                return
+                break
             if is_complete:
                 self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
             result, equal = self._branches.solutions.beside(completed)
             if result is not None and self._subsolves.usable(result):
                 self._keep(result, equal)
+                end = self._c.evaluate(result.w).f
             if result is None or not result.stopped:
-                return
+                break
             w = result.w
+        return end
 
     def _keep(self, solved, equal=None):
         """Keep a feasible point that is better than the best of the path, or of all; its certificate comes at the end."""

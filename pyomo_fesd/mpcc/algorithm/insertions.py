@@ -9,10 +9,12 @@ Leaves: the ``Verdict`` of each order.
 Does not apply: to models without parts.
 """
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
+from pyomo_fesd.mpcc.algorithm.moves import differs
 from pyomo_fesd.mpcc.subproblems import G_ZERO, H_ZERO, EndInsertion, Insertion, Verdict, of_orders
 
 #: Whether a copy lies before the part beside an end between two rows: that on the near side of it, and that on the far side.
@@ -54,20 +56,46 @@ class OrdersByInsertion:
         alone = tuple(self._row(numbers, coincidence, [(side, unchanged[side])], present)[0] for side, _ in places)
         return self._subsolves.insertion(self._point, self._sets, self._row(numbers, coincidence, places, present), alone)
 
-    def entered(self, way) -> Verdict:
-        """The verdict of a change that has come in on both sides of an end between two rows: both must be possible."""
+    def entered(self, way, coincidence) -> Verdict:
+        """The verdict of a change that has come in on both sides of an end between two rows: both must be possible.
+
+        ``coincidence`` is that of the changes at this end; what happens there may happen before the change that has come in.
+        """
         if way is None or not way.between or len(way.extents) != len(SIDES):
             return Verdict.NONE
-        found = [self._beside_boundary(way, extent, ahead) for extent, ahead in zip(way.extents, SIDES)]
-        return next((verdict for verdict in (Verdict.IMPOSSIBLE, Verdict.UNKNOWN) if verdict in found), Verdict.NONE)
-
-    def _beside_boundary(self, way, extent, ahead):
-        """The verdict of the place on one side of such an end, by its values alone."""
-        k = self._parts.by_extent.get(extent)
-        if k is None:
+        places = [(self._parts.by_extent.get(extent), ahead) for extent, ahead in zip(way.extents, SIDES)]
+        if any(k is None for k, _ in places):
             return Verdict.NONE
-        order = Insertion(k, ahead, way.zero, self._sets.zero, (k, *self._parts.beside(k)))
-        return self._subsolves.insertion(self._point, self._sets, (order,), None)
+        found = [self._judged(way, [place], grows=False) for place in places]
+        if Verdict.NONE in found:
+            return Verdict.NONE
+        # what has come in on one side only would have to go back as it arrives at the end
+        both = Verdict.IMPOSSIBLE if Verdict.IMPOSSIBLE in found else self._judged(way, places, grows=True)
+        return of_orders([both, *self._behind_what_happens(way, coincidence)])
+
+    def _judged(self, way, places, grows):
+        """The verdict of such a change in places in a row; unless it ``grows`` by their values alone."""
+        order, unchanged = (
+            tuple(Insertion(k, ahead, zero, self._sets.zero, (k, *self._parts.beside(k))) for k, ahead in places)
+            for zero in (way.zero, self._sets.zero)
+        )
+        return self._subsolves.insertion(self._point, self._sets, order, unchanged if grows else None)
+
+    def _behind_what_happens(self, way, coincidence) -> list:
+        """The verdict of such a change in a place before the end at the beginning of which happens what happens at the end.
+
+        As bodies that part exactly at the boundary after an impact: where it comes earlier they may stay together until then.
+        """
+        present = [] if coincidence is None else [change for change in coincidence.changes if differs(change, self._sets)]
+        if not any(np.any(self._sets.zero[change.happening] != G_ZERO) for change in present):
+            return []
+        k = self._parts.by_extent[way.extents[0]]
+        (moved,), (alone,) = (
+            self._row({BEFORE: k, AFTER: k + 1}, coincidence, [(BEFORE, happened)], present) for happened in (present, ())
+        )
+        entered = (way.zero != self._sets.zero) & (self._parts.of_pair == k) & ~self._parts.in_gate
+        order = replace(moved, zero=np.where(entered, way.zero, moved.zero))
+        return [self._subsolves.insertion(self._point, self._sets, (order,), (alone,))]
 
     def at_end(self, changed) -> Verdict:
         """The verdict of a change that has come in at an end of all rows."""

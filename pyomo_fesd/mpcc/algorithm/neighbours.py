@@ -31,7 +31,7 @@ class Neighbours:
         self._c, self._subsolves, self._biactive = subsolves.compiled, subsolves, subsolves.tolerances.biactive
         self.all = self._c.neighbours
 
-    def zero_sides(self, point, *neighbours, always=False, wide=False):
+    def zero_sides(self, point, *neighbours, always=False, wide=False, settles=False):
         """The zero sides of neighbouring branches of ``point``, one after the other; None if they need not be tried.
 
         Parameters
@@ -40,6 +40,8 @@ class Neighbours:
             whether also where no variable is at its lower bound, although they ask for that
         wide : bool
             whether all moves, also where nothing changes
+        settles : bool
+            whether a branch of the point counts too, in which bi-active pairs have other sides than these now have
         """
         if not (always or all(self._is_one_of(point, neighbour) for neighbour in neighbours)):
             return None
@@ -50,7 +52,7 @@ class Neighbours:
             changes = [change for change in neighbour.changes if wide or differs(change, now)]
             zero = with_moves(zero, [change.moved(neighbour.later) for change in changes])
         # the point lies on both sides of a bi-active pair already
-        return zero if np.any((zero != sets.zero) & ~sets.gamma) else None
+        return zero if np.any((zero != sets.zero) & (settles | ~sets.gamma)) else None
 
     def _is_one_of(self, point, neighbour):
         """Whether a neighbouring branch is one of this point: a variable is at its lower bound, if it asks for that."""
@@ -74,3 +76,15 @@ class Neighbours:
         by_first = {neighbour.short.tobytes(): neighbour for neighbour in reversed(short)}
         by_last = {neighbour.short.tobytes(): neighbour for neighbour in short}
         return [list(reversed(some.values())) for some in (by_first, by_last)] if len(by_last) > 1 else []
+
+    def with_fewer_short(self, point) -> Iterator[np.ndarray]:
+        """Yield the zero sides of the neighbouring branches without all variables at their lower bound, then without each one.
+
+        What such a place holds may be bi-active: only where all of it moves does the place beside it take over.
+        """
+        each = [[neighbour] for neighbour in self.all if neighbour.short.size]
+        for wide in (False, True):
+            for some in (*self.without_all_short(point), *each):
+                zero = self.zero_sides(point, *some, wide=wide, settles=wide)
+                if zero is not None:
+                    yield zero

@@ -102,7 +102,15 @@ class Orders:
         self._subsolves, self._c, self._tolerances = subsolves, subsolves.compiled, subsolves.tolerances
 
     def at(self, point, sets) -> Iterator[Order]:
-        """Yield the orders of the changes that fall together at a point."""
+        """Yield the orders of the changes that fall together at a point, those with the same key once."""
+        seen = set()
+        for order in self._all(point, sets):
+            key = order.key
+            if key is None or key not in seen:
+                seen.add(key)
+                yield order
+
+    def _all(self, point, sets):
         w, inserted = point.w, OrdersByInsertion(self._subsolves, point, sets)
         for coincidence, at in self._situations(w, sets):
             present = [change for change in coincidence.changes if differs(change, at)]
@@ -121,8 +129,14 @@ class Orders:
                 else:
                     yield Order(later + earlier, judges, after)
         for entered, changed, alone in branches(self._c, w, sets, self._tolerances.biactive, partial(self._subsolves.settled, w)):
-            judges = [partial(inserted.entered, entered), partial(inserted.at_end, changed)]
+            judges = [partial(inserted.entered, entered, self._at_end_of(entered)), partial(inserted.at_end, changed)]
             yield Order([] if entered is None else [entered], judges, None if alone is None else AtEnd(*alone))
+
+    def _at_end_of(self, way):
+        """The coincidence at an end between two rows, at which a change has come in; None where there is none."""
+        if way is None or not way.between:
+            return None
+        return next((c for c in self._c.coincidences if c.fixed and (c.before, c.after) == tuple(way.extents)), None)
 
     def judged(self, point, sets, row) -> Verdict:
         """The verdict of places in a row."""

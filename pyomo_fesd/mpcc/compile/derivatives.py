@@ -48,17 +48,18 @@ class Outer:
             'weight': ca.SX(self.weight),
             'cost': cost,
             'rows': self.rows,
-            'cost_gradient': ca.gradient(cost, both),
+            'cost_gradient': ca.jacobian(cost, both).T,
             'rows_jacobian': ca.jacobian(self.rows, both),
-            'factors': ca.gradient(lagrangian, self.z),
-            'hessian': ca.hessian(lagrangian, both)[0],
         }
-        inputs, values = [self.z, self.s, self.parameter, of_f, of_rows], [z, s, parameter, lam_f, lam]
-        return {name: _at(piece, inputs, values) for name, piece in pieces.items()}
+        with_multipliers = {'factors': ca.gradient(lagrangian, self.z), 'hessian': ca.hessian(lagrangian, both)[0]}
+        inputs, values = [self.z, self.s, self.parameter], [z, s, parameter]
+        found = {name: _at(piece, inputs, values) for name, piece in pieces.items()}
+        inputs, values = [*inputs, of_f, of_rows], [*values, lam_f, lam]
+        return found | {name: _at(piece, inputs, values) for name, piece in with_multipliers.items()}
 
     def inserted(self, z) -> list:
-        """Return ``weight``, ``cost`` and ``rows`` at expressions (SX) of the inner functions."""
-        pieces = [ca.SX(self.weight), ca.SX(self.cost), self.rows]
+        """Return ``weight``, ``cost``, ``rows`` and their Jacobian by (z, s) at expressions (SX) of the inner functions."""
+        pieces = [ca.SX(self.weight), ca.SX(self.cost), self.rows, ca.jacobian(self.rows, ca.vertcat(self.z, self.s))]
         return ca.substitute(pieces, [self.z], [z]) if z.numel() else pieces
 
 
@@ -73,11 +74,11 @@ class Nlp:
     derivatives: Derivatives
 
 
-def automatic(x: ca.SX, f: ca.SX, g: ca.SX) -> Derivatives:
-    """Derivatives that casadi finds for one NLP by itself."""
+def automatic(x: ca.SX, f: ca.SX, g: ca.SX, jacobian: ca.SX = None) -> Derivatives:
+    """Derivatives that casadi finds for one NLP by itself, if not even the ``jacobian`` of g is known."""
     lam_f, lam_g = ca.SX.sym('lam_f'), ca.SX.sym('lam_g', g.numel())
     hessian = ca.hessian(lam_f * f + _dot(lam_g, g), x)[0]
-    return Derivatives(ca.gradient(f, x), ca.jacobian(g, x), ca.triu(hessian), lam_f, lam_g)
+    return Derivatives(ca.gradient(f, x), ca.jacobian(g, x) if jacobian is None else jacobian, ca.triu(hessian), lam_f, lam_g)
 
 
 class ModelDerivatives:
@@ -93,28 +94,42 @@ class ModelDerivatives:
     def __init__(self, functions, n, parameters, m, inner):
         sizes = ('w', n), ('p', parameters), ('of_cost', 2), ('of_g', m), ('of_z', inner)
         self._parts, self._symbols = (functions.cost, functions.rows, functions.sides), [functions.kind.sym(*one) for one in sizes]
-        at = self._symbols[:2]
-        self._values = ca.Function('values', at, [rows.values(*at) for rows in self._parts])
-        self._slopes = ca.Function('slopes', at, [rows.jacobian(*at) for rows in self._parts])
+
+    # a function for each part: a gradient needs no row, a Hessian no part that is linear, and a certificate no Hessian
 
     @cached_property
-    def _hessian(self):
-        # a certificate needs none
-        w, p, *factors = self._symbols
-        curvatures = [rows.hessian(w, p, some) for rows, some in zip(self._parts, factors)]
-        return ca.Function('hessian', self._symbols, [sum(curvatures[1:], curvatures[0])])
+    def _values(self):
+        at = self._symbols[:2]
+        return [ca.Function('values', at, [rows.values(*at)]) for rows in self._parts]
+
+    @cached_property
+    def _slopes(self):
+        at = self._symbols[:2]
+        return [ca.Function('slopes', at, [rows.jacobian(*at)]) for rows in self._parts]
+
+    @cached_property
+    def _curvatures(self):
+        """The Hessians of the parts that are not linear, None for the others."""
+        (w, p), factors = self._symbols[:2], self._symbols[2:]
+        functions = (
+            None if rows.functions.is_linear else ca.Function('curvatures', [w, p, some], [rows.hessian(w, p, some)])
+            for rows, some in zip(self._parts, factors)
+        )
+        return list(functions)
 
     def values(self, w, p) -> list:
         """Return (f, penalty), g and (G, H, equal) at expressions."""
-        return self._values.call([w, p])
+        return [function.call([w, p])[0] for function in self._values]
 
     def slopes(self, w, p) -> list:
         """Return their Jacobians by w."""
-        return self._slopes.call([w, p])
+        return [function.call([w, p])[0] for function in self._slopes]
 
     def hessian(self, w, p, of_cost, of_g, of_z):
         """Return the upper triangle of the Hessian by w of the functions with these factors."""
-        return self._hessian.call([w, p, of_cost, of_g, of_z])[0]
+        both = zip(self._curvatures, (of_cost, of_g, of_z))
+        nothing = type(w)(w.numel(), w.numel())
+        return sum((function.call([w, p, factors])[0] for function, factors in both if function is not None), nothing)
 
 
 def composed(c, outer: Outer) -> Nlp:
@@ -129,10 +144,17 @@ def composed(c, outer: Outer) -> Nlp:
 
 
 def _inserted(c, outer):
-    """The ``Nlp`` of a short model: casadi derives its expressions in less time than the chain rule's matrices take to make."""
-    weight, cost, rows = outer.inserted(ca.vertcat(c.G, c.H, c.equal))
+    """The ``Nlp`` of a short model: casadi derives its expressions in less time than the chain rule's matrices take to make.
+
+    The Jacobian alone is made of the model's: casadi needs a pass for every column of a row that contains all of them, or for every
+    row of such a column, as that of a slack.
+    """
+    weight, cost, rows, slopes = outer.inserted(ca.vertcat(c.G, c.H, c.equal))
     x, f, g = ca.vertcat(c.x, outer.s), c.f + weight * c.penalty + cost, ca.vertcat(c.g, rows)
-    return Nlp(x, ca.vertcat(outer.parameter, c.p), f, g, automatic(x, f, g))
+    m, ns, J = len(c.lbg), outer.s.numel(), c.jacobian
+    chain = ca.diagcat(J[m:, :], ca.SX.eye(ns))
+    jacobian = ca.vertcat(ca.horzcat(J[:m, :], ca.SX(m, ns)), ca.mtimes(slopes, chain))
+    return Nlp(x, ca.vertcat(outer.parameter, c.p), f, g, automatic(x, f, g, jacobian))
 
 
 def _by_chain_rule(c, outer):
@@ -145,7 +167,8 @@ def _by_chain_rule(c, outer):
     at = outer.at(z, between(x, n, n + ns), between(p, 0, own), lam_f, between(lam_g, m, m + rows))
     chain, weight = ca.diagcat(J_z, kind.eye(ns)), at['weight']
     slopes = J_cost[0, :].T + weight * J_cost[1, :].T
-    gradient = ca.vertcat(slopes, kind(ns, 1)) + chain.T @ at['cost_gradient']
+    of_z, of_s = between(at['cost_gradient'], 0, c.inner), between(at['cost_gradient'], c.inner, c.inner + ns)
+    gradient = ca.vertcat(slopes + J_z.T @ of_z, of_s)
     jacobian = ca.vertcat(ca.horzcat(J_g, kind(m, ns)), at['rows_jacobian'] @ chain)
     of_model = d.hessian(*model, ca.vertcat(lam_f, lam_f * weight), between(lam_g, 0, m), at['factors'])
     hessian = ca.diagcat(of_model, kind(ns, ns)) + ca.triu(chain.T @ at['hessian'] @ chain)
@@ -177,11 +200,11 @@ def with_parts(nlp: Nlp, up, down) -> Nlp:
 
 
 def _at(expression, inputs, values):
-    """An SX expression at ``values``, of which only those that it depends on are evaluated."""
-    is_fixed = expression.is_constant()
-    used = [k for k, symbol in enumerate(inputs) if not is_fixed and symbol.numel() and ca.depends_on(expression, symbol)]
-    function = ca.Function('piece', [inputs[k] for k in used], [expression])
-    return function.call([values[k] for k in used])[0] if used else type(values[0])(ca.evalf(expression))
+    """An SX expression at ``values``, of which the first ones, inner functions, are only evaluated if it depends on them."""
+    if expression.is_constant():
+        return type(values[0])(ca.evalf(expression))
+    first = 0 if inputs[0].numel() and ca.depends_on(expression, inputs[0]) else 1
+    return ca.Function('piece', inputs[first:], [expression]).call(values[first:])[0]
 
 
 def _dot(factors, rows):

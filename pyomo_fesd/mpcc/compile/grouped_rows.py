@@ -80,7 +80,7 @@ def _class(form, instances, free, parts):
 
 def _of_others(rows, column, free, parts):
     """One instance of one function, with the parts of all ``rows`` as its values."""
-    used = sorted(set().union(*(parts.variables(*row.nonlinear) for _, row in rows)), key=column.__getitem__)
+    used = sorted(parts.variables(row.nonlinear for _, row in rows), key=column.__getitem__)
     s = ca.SX.sym('s', len(used))
     known = dict(zip(used, ca.vertsplit(s)))
     values = [parts.value(*row.nonlinear, known) for _, row in rows]

@@ -67,6 +67,11 @@ class MpccFunctions:
         return ModelDerivatives(self._functions, len(self.x0), len(self.parameters), len(self.lbg), self.inner)
 
     @cached_property
+    def jacobian(self) -> ca.SX:
+        """The Jacobian of g, G, H and equal, one upon another, of a short model."""
+        return ca.jacobian(ca.vertcat(self.g, self.G, self.H, self.equal), self.x)
+
+    @cached_property
     def _values(self):
         outputs = [self.f, self.g, self.G, self.H, self.eta]
         return NumericFunction(ca.Function('values', [self.x, self.p], [ca.densify(output) for output in outputs]))
@@ -85,7 +90,7 @@ class MpccFunctions:
         at, q = (self.x, self.p), self.pairs
         if self.short:
             slopes = ca.jacobian(self.f, self.x)
-            blocks = [ca.jacobian(ca.vertcat(self.g, self.G, self.H, self.equal), self.x)]
+            blocks = [self.jacobian]
         else:
             of_cost, *blocks = self.derivatives.slopes(*at)
             slopes = of_cost[0, :]

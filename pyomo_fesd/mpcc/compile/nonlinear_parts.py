@@ -114,10 +114,17 @@ class NonlinearParts:
             form.append((structure, tuple([places[k] for k in ids])))
         return Canonical(tuple(form), [k for k, place in places.items() if place >= 0], constants)
 
-    def variables(self, template, arguments) -> set:
-        """Return the ids of the variables of a part."""
-        inner = self._inner(arguments, ())
-        return {k for ids in (arguments, *(self._template(k)[1] for k in inner)) for k in ids if k not in self._named}
+    def variables(self, parts) -> set:
+        """Return the ids of the variables of some parts, each a template with its arguments."""
+        found = {k for _, arguments in parts for k in arguments}
+        waiting = list(found)
+        while waiting:
+            k = waiting.pop()
+            if k in self._named:
+                new = set(self._template(k)[1]) - found
+                found |= new
+                waiting += new
+        return {k for k in found if k not in self._named}
 
     def value(self, template, arguments, values):
         """Return a part at ``values`` (casadi, by id), which gets those of its named expressions as well."""

@@ -102,20 +102,13 @@ class RowReader:
 
     def variables(self, rows, objective, others) -> list:
         """Return the variables of the rows, of the objective's terms and ``others``, nonlinear ones first, in the model's order."""
-        by_rows, by_objective = self._nonlinear(rows), self._nonlinear(objective)
+        by_rows, by_objective = (self.parts.variables(row.nonlinear for row in some if row.nonlinear) for some in (rows, objective))
         used = {k for row in (*rows, *objective) for k in row.linear} | by_rows | by_objective
         self._known.update({id(v): v for v in others})
         used.update(map(id, others))
         rank = {k: 0 for k in used} | dict.fromkeys(by_objective, -1) | dict.fromkeys(by_rows, -2)
         rank |= dict.fromkeys(by_rows & by_objective, -3)
         return sorted((v for k, v in self._known.items() if k in used), key=lambda v: rank[id(v)])
-
-    def _nonlinear(self, rows):
-        found = set()
-        for row in rows:
-            if row.nonlinear:
-                found |= self.parts.variables(*row.nonlinear)
-        return found
 
 
 @contextmanager

@@ -147,7 +147,7 @@ class _CasadiNlp(NlpSolver):
         if not self.TAKES_DERIVATIVES:
             return self._own
         x, p, f, g = self._problem.values()
-        return self._own | WITHOUT_PARAMETERS | _functions(x, p, f, g, self._derivatives or automatic(x, f, g))
+        return self._own | WITHOUT_PARAMETERS | derivative_functions(x, p, f, g, self._derivatives or automatic(x, f, g))
 
     def _solver_for(self, warm):
         """The solver for a start without or with multipliers, made when it is first needed."""
@@ -241,11 +241,15 @@ class CasadiUno(_CasadiNlp):
         return UNIFIED.get(stats['unified_return_status'], stats['return_status'])
 
 
-def _functions(x, p, f, g, d):
-    """casadi's options for derivatives."""
+def derivative_functions(x, p, f, g, d) -> dict:
+    """Return casadi's options for the ``Derivatives`` d.
+
+    Ipopt asks these functions for derivatives only, but casadi would evaluate the values in their signatures all the same.
+    """
+    no_f, no_g = type(x)(1, 1), type(x)(g.numel(), 1)
     return {
-        'grad_f': ca.Function('nlp_grad_f', [x, p], [f, ca.densify(d.gradient)], ['x', 'p'], ['f', 'grad_f_x']),
-        'jac_g': ca.Function('nlp_jac_g', [x, p], [g, d.jacobian], ['x', 'p'], ['g', 'jac_g_x']),
+        'grad_f': ca.Function('nlp_grad_f', [x, p], [no_f, ca.densify(d.gradient)], ['x', 'p'], ['f', 'grad_f_x']),
+        'jac_g': ca.Function('nlp_jac_g', [x, p], [no_g, d.jacobian], ['x', 'p'], ['g', 'jac_g_x']),
         'hess_lag': ca.Function(
             'nlp_hess_l', [x, p, d.lam_f, d.lam_g], [d.hessian], ['x', 'p', 'lam_f', 'lam_g'], ['triu_hess_gamma_x_x']
         ),

@@ -21,7 +21,7 @@ from pyomo_fesd.mpcc.compile import with_entries
 #: Newton steps; residual of the rows, each over its largest entry, and last step, at which they end.
 STEPS, RESIDUAL, LAST_STEP = 30, 1e-10, 1e-7
 #: Equations that leave more than this, relative to their terms, contradict each other; the point at which they are compared.
-CONTRADICTION, SEED = 1e-3, 0
+CONTRADICTION, SEED = 1e-5, 0
 #: Agreement of a side with a sum of rows.
 EXACT = 1e-9
 #: Singular values below this, relative to the largest one, are zero: extents enter with their square.

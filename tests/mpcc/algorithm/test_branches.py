@@ -348,8 +348,8 @@ def test_with_the_decisions_of_its_sides_a_branch_takes_one_nlp(at_once, nlps):
     assert np.any(point.equal) and p.compiled.decided(point.w)[point.equal] == pytest.approx(0, abs=1e-8)
 
 
-@pytest.mark.parametrize('cost, found', [(0.5 * branch_solutions.AS_GOOD, True), (2 * branch_solutions.AS_GOOD, False)])
-def test_only_a_point_that_is_as_good_counts_with_fewer_variables_at_their_lower_bound(cost, found, monkeypatch):
+@pytest.mark.parametrize('cost, found', [(0.5 * branches.UNEVEN, True), (2 * branches.UNEVEN, False)])
+def test_only_a_point_that_is_nearly_as_good_counts_with_fewer_variables_at_their_lower_bound(cost, found, monkeypatch):
     p = jump_inside_a_stage()
     point, short = p.run.point, p.compiled.neighbours[0].short
     at_bound, off = point.w.copy(), replace(point, f=point.f + cost * max(1.0, abs(point.f)))
@@ -360,7 +360,20 @@ def test_only_a_point_that_is_as_good_counts_with_fewer_variables_at_their_lower
         return off if off.f <= enough else None
 
     monkeypatch.setattr(p.branches.solutions, 'certified', certified)
-    monkeypatch.setattr(p.branches.neighbours, 'beside_short', lambda point: [np.zeros(1, dtype=int)])
+    monkeypatch.setattr(p.branches.neighbours, 'with_fewer_short', lambda point: [np.zeros(1, dtype=int)])
     assert (p.branches.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound))) is off) == found
     # no fewer than before
     assert p.branches.with_fewer_short(point) is None
+
+
+def test_branches_without_places_of_least_extent_are_those_of_all_and_of_each_one():
+    p = jump_inside_a_stage()
+    neighbours, point = p.branches.neighbours, p.run.point
+    assert not list(neighbours.with_fewer_short(point)), "no place is at its least extent"
+    short = [n for n in neighbours.all if n.short.size]
+    at_bound = point.w.copy()
+    for n in short:
+        at_bound[n.short] = p.compiled.lbx[n.short]
+    found = list(neighbours.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound))))
+    zero = p.subsolves.sets(at_bound, 1e-8).zero
+    assert len(found) > len(short) and all(np.any(other != zero) for other in found)

@@ -13,7 +13,7 @@ from problems.parts import compiled
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import BranchConstraint, Penalty, homotopy_hints
-from pyomo_fesd.mpcc.compile import scaled_functions
+from pyomo_fesd.mpcc.compile import assemble, scaled_functions
 from pyomo_fesd.mpcc.compile.derivatives import Outer, automatic, composed
 from pyomo_fesd.mpcc.subproblems.branch import Branch
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS, Relaxation
@@ -96,7 +96,7 @@ def by_the_chain_rule():
 def test_gradients_alone_make_no_hessian():
     c = PROBLEMS['exponential side']()
     c.gradients(c.x0)
-    assert 'derivatives' in vars(c) and '_hessian' not in vars(c.derivatives)
+    assert 'derivatives' in vars(c) and '_curvatures' not in vars(c.derivatives)
 
 
 @pytest.fixture(params=PROBLEMS)
@@ -145,10 +145,13 @@ def test_the_branch_nlp(c):
     agree(x, p, *rest, random_points(x.numel(), c.parameters))
 
 
-@pytest.mark.parametrize('form', ['elastic', 'l1', 'scholtes'])
+@pytest.mark.parametrize('form', ['elastic', 'l1', 'scholtes', 'branch'])
 def test_short_problems_get_the_same_nlp(c, form, monkeypatch):
+    def build(make):
+        return Branch(c, sort_sides(c), make) if form == 'branch' else Relaxation(c, sort_sides(c), RELAXATIONS[form][1], make)
+
     def handed():
-        x, p, f, g, d = made(lambda make: Relaxation(c, sort_sides(c), RELAXATIONS[form][1], make))
+        x, p, f, g, d = made(build)
         outputs = [f, g, d.gradient, d.jacobian, d.hessian]
         return ca.Function('nlp', [x, p, d.lam_f, d.lam_g], [ca.densify(output) for output in outputs])
 
@@ -162,6 +165,22 @@ def test_short_problems_get_the_same_nlp(c, form, monkeypatch):
         for found, wanted in zip(short(*at), long(*at)):
             assert found.shape == wanted.shape
             np.testing.assert_allclose(np.array(found), np.array(wanted), rtol=1e-9, atol=1e-9)
+
+
+def calls(function):
+    """Names of the functions that an MX function calls, one for each call."""
+    ids = [k for k in range(function.n_instructions()) if function.instruction_id(k) == ca.OP_CALL]
+    return [function.instruction_MX(k).which_function().name() for k in ids]
+
+
+def test_a_gradient_evaluates_no_rows_and_a_hessian_no_values_of_linear_sides(monkeypatch):
+    monkeypatch.setattr(assemble, 'LARGE', -1)
+    c = PROBLEMS['linear']()
+    x, p, _, _, d = made(lambda make: Relaxation(c, sort_sides(c), RELAXATIONS['elastic'][1], make))
+    gradient = ca.Function('gradient', [x, p], [d.gradient])
+    hessian = ca.Function('hessian', [x, p, d.lam_f, d.lam_g], [d.hessian])
+    assert calls(gradient).count('slopes') == 1 and 'values' not in calls(gradient)
+    assert calls(hessian).count('curvatures') == 1 and 'values' not in calls(hessian)
 
 
 @pytest.mark.parametrize('form', ['kanzow_schwartz', 'steffensen_ulbrich'])

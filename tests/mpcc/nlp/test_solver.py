@@ -10,6 +10,7 @@ import pytest
 
 from pyomo_fesd import FesdError
 from pyomo_fesd.mpcc.compile.derivatives import automatic
+from pyomo_fesd.mpcc.nlp.casadi_solvers import derivative_functions
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
 from pyomo_fesd.mpcc.nlp.solver import ACCEPTABLE, DIVERGING, NLP_SOLVERS, RUNNING, SOLVED, NlpResult, NlpSolver, nlp_solver
 
@@ -190,3 +191,12 @@ def test_a_solution_to_acceptable_tolerances_is_solved_but_not_exact():
         status: NlpResult(np.zeros(1), 0.0, status, 1, np.zeros(0), np.zeros(1)) for status in (SOLVED[0], ACCEPTABLE, DIVERGING)
     }
     assert [(one.solved, one.is_exact) for one in found.values()] == [(True, True), (True, False), (False, False)]
+
+
+def test_functions_of_derivatives_evaluate_no_values():
+    x, p = ca.SX.sym('x', 2), ca.SX.sym('p')
+    f, g = p * ca.exp(x[0]), ca.vertcat(ca.sin(x[1]), x[0] * x[1])
+    given = derivative_functions(x, p, f, g, automatic(x, f, g))
+    assert [given[name].size_out(0) for name in ('grad_f', 'jac_g')] == [(1, 1), (2, 1)]
+    assert [given[name].nnz_out(0) for name in ('grad_f', 'jac_g')] == [0, 0]
+    assert given['grad_f']([0.0, 0.0], 3.0)[1].full().tolist() == [[3.0], [0.0]]
