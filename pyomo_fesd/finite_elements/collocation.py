@@ -111,11 +111,15 @@ def _read_states_directly(block, wrt):
 def _make_variables(block, wrt):
     """Make the variables at the new points, in the order of pyomo.dae, which calls their rules for each of them."""
     for variable in block.component_objects((Var, DerivativeVar), descend_into=True):
-        rules = (variable._rule_init, variable._rule_bounds, variable._rule_domain)
-        # rules that are functions may need components that are not expanded yet
-        whole = variable.index_set() is wrt and not variable.is_reference()
-        if whole and all(rule is None or rule.constant() for rule in rules):
+        if variable.index_set() is wrt and not variable.is_reference() and _is_alike_everywhere(variable):
             add_copies(variable, set(wrt) - set(variable._data))
+
+
+def _is_alike_everywhere(variable):
+    """Whether the data of a Var are made alike: rules that are functions may need components that are not expanded yet."""
+    rules = (variable._rule_init, variable._rule_bounds, variable._rule_domain)
+    by_pyomo = type(variable)._getitem_when_not_present is Var._getitem_when_not_present
+    return by_pyomo and all(rule is None or rule.constant() for rule in rules)
 
 
 class _Scheme:
