@@ -55,14 +55,14 @@ from pyomo_fesd.core.homotopy_hints import (
     all_hints,
     homotopy_hints,
 )
-from pyomo_fesd.core.insertion import add_copies, insert, variable_at
+from pyomo_fesd.core.insertion import VariableMaker, add_copies, insert
 from pyomo_fesd.core.instants import Instant
 from pyomo_fesd.core.interpolation import interpolation_weights
 from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible
 from pyomo_fesd.core.keywords import check_keywords, read_keywords
 from pyomo_fesd.core.moving_grid import MovingGrid, Split, add_moving_grid, moving_grids
 from pyomo_fesd.core.node_search import contains_node, leaves_of
-from pyomo_fesd.core.own_data import data_of, declared, own_blocks, own_components, own_data, variables_below
+from pyomo_fesd.core.own_data import data_of, declared, entries_of, own_blocks, own_components, own_data, variables_below
 from pyomo_fesd.core.parts import Part
 from pyomo_fesd.core.paused_collection import paused_collection
 from pyomo_fesd.core.phase import phase

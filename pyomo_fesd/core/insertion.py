@@ -28,12 +28,32 @@ def add_copies(component: IndexedComponent, indices: Iterable) -> None:
         if first is None:
             first = component._getitem_when_not_present(index)
             continue
-        data = component._data[index] = first.copy(first)
-        data._index = index
+        copy_variable(component, index, first)
 
 
-def variable_at(component: IndexedComponent, index: tuple) -> ComponentData:
-    """Return the data of a Var at ``index``; made as it was declared where there is none."""
-    index = stored_index(index)
-    data = component._data.get(index)
-    return component._getitem_when_not_present(index) if data is None else data
+def copy_variable(component: IndexedComponent, index, like: ComponentData) -> ComponentData:
+    """Make the data of a Var at a stored ``index`` like those of the same Var at another one, and return them."""
+    data = component._data[index] = like.copy(like)
+    data._index = index
+    return data
+
+
+class VariableMaker:
+    """Makes data of Vars whose rules are constant: those of each Var once by its rules, and the others like them."""
+
+    def __init__(self):
+        self._made = {}
+
+    def at(self, component: IndexedComponent, index: tuple) -> ComponentData:
+        """Return the data at ``index``; made as they were declared where there are none."""
+        index = stored_index(index)
+        data = component._data.get(index)
+        if data is not None:
+            return data
+        # a copy, which nobody changes; a component that was deleted may have had the same id
+        like = self._made.get(id(component))
+        if like is not None and like.parent_component() is component:
+            return copy_variable(component, index, like)
+        data = component._getitem_when_not_present(index)
+        self._made[id(component)] = data.copy(data)
+        return data

@@ -7,6 +7,7 @@ Does not apply: to components of another type, such as a number for a variable; 
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from operator import itemgetter
 
 from pyomo.common.numeric_types import native_types
 from pyomo.core.expr import numeric_expr as nodes
@@ -61,13 +62,13 @@ class Stamp:
         def among_values(nodes_at):
             return [~place if place < 0 else place + len(constants) for place in nodes_at]
 
-        steps = [(make, among_values(where)) for make, where in steps]
+        steps = [(make, _getter(among_values(where))) for make, where in steps]
         roots = among_values(places[id(expr)] for expr in expressions)
 
         def build(others):
             values = [*constants, *others]
             for make, arguments in steps:
-                values.append(make([values[k] for k in arguments]))
+                values.append(make(arguments(values)))
             return [values[root] for root in roots]
 
         return build
@@ -89,7 +90,17 @@ def _in_order(expressions, known):
             yield node, arguments
 
 
+def _getter(places):
+    """The function from values to those at some ``places``, in a sequence."""
+    return itemgetter(*places) if len(places) > 1 else itemgetter(slice(places[0], places[0] + 1))
+
+
 def _maker(node):
-    if node.__class__ is relations.InequalityExpression:
-        return partial(relations.InequalityExpression, strict=node.strict)
-    return node.__class__ if node.__class__ in MADE_FROM_ARGUMENTS else node.create_node_with_local_data
+    """The function from arguments to a node like this one."""
+    cls = node.__class__
+    if cls is relations.InequalityExpression:
+        return partial(cls, strict=node.strict)
+    if isinstance(node, nodes.SumExpression):
+        # terms can be added to it
+        return lambda arguments: cls(list(arguments))
+    return cls if cls in MADE_FROM_ARGUMENTS else node.create_node_with_local_data

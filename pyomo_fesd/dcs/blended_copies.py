@@ -15,7 +15,7 @@ from typing import NamedTuple
 from pyomo.core import Var
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import Dependents, Stamp, Step, index_tuple, insert, switched_systems, variable_at
+from pyomo_fesd.core import Dependents, Stamp, Step, VariableMaker, index_tuple, insert, switched_systems
 from pyomo_fesd.dcs.source_maps import source_maps
 from pyomo_fesd.dcs.weights import Weights
 
@@ -61,7 +61,7 @@ class BlendedCopies:
     """
 
     def __init__(self, block, index, system, form):
-        self._form = form
+        self._form, self._maker = form, VariableMaker()
         record, maps = switched_systems(block), source_maps(block)
         variables = [v for component in block.component_objects(Var, descend_into=False) for v in _at(component, index)]
         own = set(map(id, variables))
@@ -87,7 +87,7 @@ class BlendedCopies:
         """Write a copy for another system at its ``index`` on its ``block``; returns the weights of its modes."""
         record, own = switched_systems(block), []
         for name, rest, is_selector in self._variables:
-            v = variable_at(block.component(name), (*index, *rest))
+            v = self._maker.at(block.component(name), (*index, *rest))
             own.append(v)
             if is_selector:
                 record.selectors.add(v)

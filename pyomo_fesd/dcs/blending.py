@@ -18,7 +18,7 @@ from pyomo_fesd.core import GENERATED, exchanged, index_tuple, insert, sum_of, s
 from pyomo_fesd.dcs.blended_copies import BlendedCopies, can_be_copied
 from pyomo_fesd.dcs.continuation import Continuation
 from pyomo_fesd.dcs.forms import heaviside
-from pyomo_fesd.dcs.reading import RecognisedSystem, split
+from pyomo_fesd.dcs.reading import split
 from pyomo_fesd.dcs.source_maps import source_maps
 from pyomo_fesd.dcs.weights import Weights
 
@@ -35,10 +35,12 @@ class Blender:
     ----------
     defined : ComponentMap VarData -> DisjunctionData
         receives the variables that the modes define
+    copies : dict id of a ModeSystem -> BlendedCopies
+        those that are known, to which others are added; the model keeps the systems
     """
 
-    def __init__(self, defined):
-        self._defined, self._copies, self._blocks = defined, {}, {}
+    def __init__(self, defined, copies):
+        self._defined, self._copies, self._written, self._blocks = defined, copies, {}, {}
 
     def blend(self, system, form) -> Callable:
         """Write one Disjunction at one time, and deactivate the source.
@@ -54,23 +56,28 @@ class Blender:
             the sum of the multipliers of some modes, given by their numbers
         """
         block, index, parts = self._block(system, form), index_tuple(system.disjunction.index()), system.parts()
-        # the analyses keep the first ones, so that no other one gets its id
-        like = id(system.first) if isinstance(system, RecognisedSystem) else None
-        if like in self._copies:
-            weight = self._copies[like].write(block, index, system, parts)
-        else:
+        copies = self._copies_like(system)
+        if copies is None:
             weight = _blend(block, index, system, form, parts)
-            if like is not None and can_be_copied(system):
-                self._copies[like] = BlendedCopies(block, index, system, form)
+            if system.stated is not None and can_be_copied(system):
+                self._written[id(system.first)] = block, index, system, form
+        else:
+            weight = copies.write(block, index, system, parts)
         for v in system.defined:
             self._defined[v] = system.disjunction
         _deactivate(block, system, parts)
         return weight
 
+    def _copies_like(self, system):
+        """The copies of what was written for a system that is built like this one, or None; made for the first one that asks."""
+        like = id(system.first)
+        if like in self._written:
+            # at once, since the user may change what was written before there are further times
+            self._copies[like] = BlendedCopies(*self._written.pop(like))
+        return self._copies.get(like)
+
     def _block(self, system, form):
         """The block for one form of one Disjunction; that of Disjunctions that are built alike is sought once."""
-        if not isinstance(system, RecognisedSystem):
-            return _form_block(system, form)
         key = id(system.disjunction.parent_component()), id(system.first)
         if key not in self._blocks:
             self._blocks[key] = _form_block(system, form)
@@ -99,7 +106,7 @@ def _form_block(system, form):
     if block.component('mode') is None:
         sets = _index_sets(system)
         if form is not None:
-            form.declare(block, sets, form.size(system))
+            form.declare(block, sets, form.size(system.first))
         block.numbers = Set(dimen=1)
         block.mode = Constraint(*sets, block.numbers)
     for j in range(1 + len(block.numbers), 1 + _number_of_equations(system)):
@@ -118,7 +125,7 @@ def _kind(system, form):
     """What form and size a block has; empty for the smallest form, whose block is that of its Disjunction."""
     if form is None:
         return 'single_mode'
-    size = form.size(system)
+    size = form.size(system.first)
     return '' if form is heaviside and size == 1 else f'{form.NAME}_{size}'
 
 
@@ -128,9 +135,9 @@ def _index_sets(system):
 
 
 def _number_of_equations(system):
-    if system.equations is None:
+    if len(system.modes) == 1:
         return sum(1 for _ in system.modes[0].constraints())
-    return len(system.equations.defined)
+    return len(system.defined)
 
 
 def _impose_only_mode(block, index, system):

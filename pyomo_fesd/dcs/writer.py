@@ -18,7 +18,6 @@ from pyomo_fesd.dcs.piecewise import PiecewiseRewriter, may_contain_functions
 from pyomo_fesd.dcs.reading import (
     Analyses,
     Nesting,
-    RecognisedSystem,
     SystemReader,
     modes_left,
     read_exclusions,
@@ -80,7 +79,7 @@ class DcsWriter(TimeWriter):
             exclusions = read_exclusions(propositions, systems)
             forms = _forms(self.form, systems)
             undo.pop_all()
-            blender = Blender(defined)
+            blender = Blender(defined, analyses.copies)
             weights = {system.tree: blender.blend(system, form) for system, form in zip(systems, forms)}
             for proposition in propositions:
                 write_exclusions(dcs_block(proposition.constraint.parent_block()), proposition, exclusions, weights)
@@ -138,10 +137,10 @@ def _forms(name, systems):
     """The form of each system; of those that are built alike it is chosen once."""
     known, forms = {}, []
     for system in systems:
-        like = id(system.first) if isinstance(system, RecognisedSystem) else id(system)
-        if like not in known:
-            known[like] = _form(name, system)
-        forms.append(known[like])
+        first = system.first
+        if id(first) not in known:
+            known[id(first)] = _form(name, first)
+        forms.append(known[id(first)])
     return forms
 
 

@@ -105,7 +105,8 @@ def _read_states_directly(block, wrt):
         over = derivative.get_continuousset_list()
         if len(over) == 1 and over[0] is wrt:
             x = derivative.get_state_var()
-            derivative.set_derivative_expression(lambda *index, x=x: x[stored_index(index)])
+            by_time = x.index_set() is wrt
+            derivative.set_derivative_expression(x.__getitem__ if by_time else lambda *index, x=x: x[stored_index(index)])
 
 
 def _make_variables(block, wrt):

@@ -5,7 +5,7 @@ import pyomo.environ as pyo
 import pytest
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core.insertion import add_copies, insert, variable_at
+from pyomo_fesd.core.insertion import VariableMaker, add_copies, insert
 
 
 @pytest.fixture
@@ -60,8 +60,12 @@ def test_copies_of_variables_are_the_same_as_those_that_pyomo_makes(m, keywords)
 
 
 def test_a_variable_that_is_there_is_found_and_others_are_made_as_declared(m):
-    m.y = pyo.Var(m.t, [1, 2], dense=False, initialize=lambda m, t, k: 10 * t + k, bounds=(0, 20))
-    first = variable_at(m.y, (1, 2))
-    assert (first.value, first.lb, first.index()) == (12, 0, (1, 2)) and list(m.y) == [(1, 2)]
-    assert variable_at(m.y, (1, 2)) is first is m.y[1, 2]
-    assert variable_at(m.x, (0,)) is m.x[0]
+    m.y, maker = pyo.Var(m.t, [1, 2], dense=False, initialize=12, bounds=(0, 20)), VariableMaker()
+    first = maker.at(m.y, (1, 2))
+    assert list(m.y) == [(1, 2)] and maker.at(m.y, (1, 2)) is first is m.y[1, 2]
+    first.setub(3)
+    first.fix(2)
+    other = maker.at(m.y, (0, 1))
+    assert maker.at(m.y, (0, 1)) is other is m.y[0, 1] and other.index() == (0, 1)
+    assert (other.value, other.lb, other.ub, other.fixed) == (12, 0, 20, False)
+    assert maker.at(m.x, (0,)) is m.x[0]

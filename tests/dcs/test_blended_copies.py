@@ -65,7 +65,7 @@ def alone(monkeypatch):
 @pytest.mark.parametrize('build', MODELS)
 def test_a_copy_is_what_would_have_been_written_alone(build, form, copies, alone):
     m = dcs(build(discretised=True), form=form)
-    assert len(copies) >= len(m.t) - 2
+    assert len(copies) >= len(m.t) - 1
     number = len(copies)
     assert written(m) == written(alone(build(discretised=True), form=form)) and len(copies) == number
 
@@ -135,7 +135,7 @@ CHANGES = [coefficient, constant, side, further_term, other_variable, other_boun
 @pytest.mark.parametrize('change', CHANGES)
 def test_one_that_differs_is_no_copy_of_the_others(change, copies, alone):
     m = dcs(linear(change, at=3))
-    assert copies == ['sgn[4]', 'sgn[5]'] or copies == ['sgn[2]', 'sgn[4]', 'sgn[5]']
+    assert copies == ['sgn[1]', 'sgn[2]', 'sgn[4]', 'sgn[5]']
     assert written(m) == written(alone(linear(change, at=3)))
 
 
