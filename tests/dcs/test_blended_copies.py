@@ -4,6 +4,7 @@ import pyomo.dae as dae
 import pyomo.environ as pyo
 import pytest
 from pyomo.core.expr.compare import compare_expressions
+from pyomo.core.expr.visitor import identify_variables
 from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity
 
@@ -209,3 +210,30 @@ def test_a_copy_contains_no_node_of_the_first_but_constants():
     rows = [c.expr for c in generated(m, pyo.Constraint).values() if '.mode[' in c.name]
     assert len({id(row.args[1]) for row in rows}) == len(rows)
     assert not compare_expressions(rows[0], rows[-1])
+
+
+def at_new_times(m):
+    """All rows that are written at times that the tank has after its discretisation only."""
+    pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=3, ncp=2)
+    block, given = m._pyomo_fesd_dcs.outlet, ('[0', '[4')
+    rows = {c.name: structure(c.expr) for c in block.component_data_objects(pyo.Constraint)}
+    variables = {v.name: (v.value, v.lb, v.ub, v.fixed) for v in block.component_data_objects(pyo.Var)}
+    return {name: found for name, found in (rows | variables).items() if not any(end in name for end in given)}
+
+
+def test_what_a_user_changes_before_there_are_further_times_is_not_copied():
+    m = dcs(tank())
+    block = m._pyomo_fesd_dcs.outlet
+    for t in (0, 4):
+        block.mode[t, 1].set_value(m.L[t] == 7)
+        block.p[t].setub(9)
+    block.alpha[0].fix(1)
+    assert at_new_times(m) == at_new_times(dcs(tank())) != {}
+
+
+def test_a_clone_is_continued_with_its_own_components():
+    m = dcs(tank())
+    other = m.clone()
+    assert at_new_times(other) == at_new_times(m)
+    rows = other._pyomo_fesd_dcs.component_data_objects(pyo.Constraint, descend_into=True)
+    assert all(v.model() is other for row in rows for v in identify_variables(row.body, include_fixed=True))
