@@ -3,7 +3,7 @@
 The expressions of its equations, conditions and multipliers are built again from the variables and Params of the others
 (``core/stamp.py``): nothing is solved for a variable, nothing is blended.
 
-Takes: a ``RecognisedSystem`` that ``blending.py`` has written, with its block and index.
+Takes: a system that ``blending.py`` has written, with its block and index, at once after that: a user may change what was written.
 Leaves: for others of the same ``first`` the same components on their block, at their index, and the same entries of the records.
 Does not apply: where a mode is implicit, or continued outside of its region: start values and bounds of these variables are found
     one by one.
@@ -56,7 +56,7 @@ class BlendedCopies:
         with all that was written for it
     index : tuple
         of the Disjunction
-    system : RecognisedSystem
+    system : ModeSystem or RecognisedSystem
     form : module of ``forms``
     """
 

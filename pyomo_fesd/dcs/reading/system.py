@@ -96,7 +96,7 @@ class HysteresisSystem(ModeSystem):
         for each mode the c_ik of its region c_ik >= 0
     """
 
-    conditions: list = ()
+    conditions: list = field(default_factory=list)
 
 
 @dataclass(frozen=True)
