@@ -55,14 +55,14 @@ from pyomo_fesd.core.homotopy_hints import (
     all_hints,
     homotopy_hints,
 )
-from pyomo_fesd.core.insertion import insert
+from pyomo_fesd.core.insertion import VariableMaker, add_copies, insert
 from pyomo_fesd.core.instants import Instant
 from pyomo_fesd.core.interpolation import interpolation_weights
 from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, interruptible
 from pyomo_fesd.core.keywords import check_keywords, read_keywords
 from pyomo_fesd.core.moving_grid import MovingGrid, Split, add_moving_grid, moving_grids
 from pyomo_fesd.core.node_search import contains_node, leaves_of
-from pyomo_fesd.core.own_data import data_of, declared, own_blocks, own_components, own_data, variables_below
+from pyomo_fesd.core.own_data import data_of, declared, entries_of, own_blocks, own_components, own_data, variables_below
 from pyomo_fesd.core.parts import Part
 from pyomo_fesd.core.paused_collection import paused_collection
 from pyomo_fesd.core.phase import phase
@@ -70,9 +70,9 @@ from pyomo_fesd.core.positive_part import add_part_of_number, add_positive_part,
 from pyomo_fesd.core.private_data import records_below, remember_records
 from pyomo_fesd.core.renamed import Renamed
 from pyomo_fesd.core.rollback import restored, restored_on_error
-from pyomo_fesd.core.smallest import add_smallest, declare_smallest
+from pyomo_fesd.core.smallest import add_smallest, declare_smallest, start_smallest
 from pyomo_fesd.core.stamp import Stamp
-from pyomo_fesd.core.step import add_step, declare_step
+from pyomo_fesd.core.step import add_step, declare_step, start_step
 from pyomo_fesd.core.structural_key import StructuralKey, any_number, exactly, nine_digits, variables_of
 from pyomo_fesd.core.sums import product_of, sum_of, weighted_sum
 from pyomo_fesd.core.switched_systems import (

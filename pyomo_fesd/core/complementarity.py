@@ -132,9 +132,10 @@ def read_complementarity(data) -> Pair | Mixed:
         a bare variable, its declared bounds).
     """
     args = _arguments(data)
-    if all(map(_is_lower_bound_zero, args)):
-        # most conditions are generated, and there is one at every time: the rest takes longer than to read them
-        return Pair(*(arg.args[1] for arg in args))
+    # most conditions are generated, and there is one at every time: the rest takes longer than to read them
+    G, H = map(_stated_above_zero, args)
+    if G is not None and H is not None:
+        return Pair(G, H)
     sides = [read_side(arg) for arg in args]
     stated = [isinstance(arg, (InequalityExpression, RangedExpression)) for arg in args]
     for i, j in ((0, 1), (1, 0)):
@@ -156,9 +157,12 @@ def read_complementarity(data) -> Pair | Mixed:
     )
 
 
-def _is_lower_bound_zero(arg):
-    """Whether an argument reads ``0 <= body``, of a number that cannot change."""
-    return arg.__class__ is InequalityExpression and arg.args[0].__class__ in native_numeric_types and arg.args[0] == 0
+def _stated_above_zero(arg):
+    """The body of an argument that reads ``0 <= body``, of a number that cannot change, else None."""
+    if arg.__class__ is not InequalityExpression:
+        return None
+    low, body = arg.args
+    return body if low.__class__ in native_numeric_types and low == 0 else None
 
 
 def _arguments(data):

@@ -75,7 +75,7 @@ def expression_key(expressions, kind) -> tuple:
     ----------
     expressions : iterable of expressions
     kind : callable VarData -> hashable
-        properties of a variable that belong to the key; of a Param its value belongs to it
+        properties of a variable that belong to the key; of a Param its value and its unit belong to it
 
     Returns
     -------
@@ -109,7 +109,7 @@ def expression_key(expressions, kind) -> tuple:
             elif node.is_expression_type():
                 return None, []
             else:
-                kinds.append(value(node, exception=False))
+                kinds.append((value(node, exception=False), str(node.get_units() if node.is_parameter_type() else node)))
         tokens.append(number)
     return (tuple(tokens), tuple(kinds)), parts
 

@@ -5,14 +5,23 @@ Leaves: nothing.
 Does not apply: where the user has named components, which may be References.
 """
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
+from operator import itemgetter
 
 from pyomo.core import Block, Var
 from pyomo.core.base.block import BlockData
 
 
-def own_components(block: Block, ctype, descend_into, active: bool | None = None) -> Iterator:
-    """Yield the components of type ``ctype`` that are no References; the parameters and the order are those of Pyomo's walks."""
+def own_components(
+    block: Block, ctype, descend_into, active: bool | None = None, enter: Callable[[BlockData], bool] | None = None
+) -> Iterator:
+    """Yield the components of type ``ctype`` that are no References; the parameters and the order are those of Pyomo's walks.
+
+    Parameters
+    ----------
+    enter : function BlockData -> bool, optional
+        whether to search a block below
+    """
     wanted, places = (set(types) if isinstance(types, tuple) else {types} for types in (ctype, descend_into))
     met, waiting = wanted | places, [block] if active is None or block.active == active else []
     while waiting:
@@ -20,7 +29,7 @@ def own_components(block: Block, ctype, descend_into, active: bool | None = None
         yield from _of_state(declared(place, wanted), active)
         # Disjuncts are many, and most have none of the types
         inner = _of_state(declared(place, places), active)
-        found = [b for c in inner for b in data_of(c) if not met.isdisjoint(b._ctypes)]
+        found = [b for c in inner for b in data_of(c) if not met.isdisjoint(b._ctypes) and (enter is None or enter(b))]
         waiting += [b for b in reversed(found) if active is None or b.active == active]
 
 
@@ -32,14 +41,18 @@ def _of_state(components, active):
 def declared(block: Block, types: Collection) -> Iterable:
     """Return the components of some ``types`` on ``block`` itself, in the order of their declaration."""
     # most blocks have none, or a few: Pyomo takes longer to make a map than to follow its own list
-    ordered, first, places = block._decl_order, block._ctypes, []
+    ordered, first, found = block._decl_order, block._ctypes, []
     for ctype in types:
         place = first[ctype][0] if ctype in first else None
         while place is not None:
-            places.append(place)
-            place = ordered[place][1]
-    # a component that was deleted leaves None
-    return [ordered[place][0] for place in sorted(places) if ordered[place][0] is not None]
+            component, following = ordered[place]
+            # one that was deleted leaves None
+            if component is not None:
+                found.append((place, component))
+            place = following
+    if len(types) > 1:
+        found.sort(key=itemgetter(0))
+    return [component for _, component in found]
 
 
 def is_reference(component) -> bool:

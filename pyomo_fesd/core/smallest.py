@@ -9,6 +9,7 @@ Leaves: ``nu``, ``lam`` (by function), ``mu``, ``stationarity``, ``simplex``, ``
 Does not apply: to two functions, where one step is smaller (``step.py``).
 """
 
+from collections.abc import Sequence
 from math import nan
 
 from pyomo.core import Constraint, RangeSet, Var
@@ -41,9 +42,8 @@ def add_smallest(block: BlockData, index: tuple, g: list) -> list:
     """Add the linear program whose solution nu weights the smallest of the functions g_i at ``index``; return nu."""
     nu, lam = ([variable[stored_index((*index, i))] for i in block.regions] for variable in (block.nu, block.lam))
     mu = block.mu[stored_index(index)]
-    mu.value, *found = smallest_values([value_or_zero(g_i) for g_i in g])
+    start_smallest((mu, *lam, *nu), g)
     for i, g_i in enumerate(g):
-        nu[i].value, lam[i].value = 1 / len(g), found[i]
         block.stationarity.add(stored_index((*index, i + 1)), without_unit(g_i) - lam[i] - mu == 0)
         block.complementarity.add(stored_index((*index, i + 1)), complements(nu[i] >= 0, lam[i] >= 0))
         if i:
@@ -52,6 +52,13 @@ def add_smallest(block: BlockData, index: tuple, g: list) -> list:
     block.simplex.add(stored_index(index), sum(nu) == 1)
     switched_systems(block).dependents.append(Dependents((mu, *lam, *nu), tuple(g), smallest_values))
     return nu
+
+
+def start_smallest(variables: Sequence, g: Sequence) -> None:
+    """Set the start values of mu, lam and nu from the present values of the functions g_i."""
+    mu, *lam = smallest_values([value_or_zero(g_i) for g_i in g])[: 1 + len(g)]
+    for variable, start in zip(variables, (mu, *lam, *[1 / len(g)] * len(g))):
+        variable.value = start
 
 
 def smallest_values(g: list[float]) -> list[float]:

@@ -6,6 +6,8 @@ Does not apply: to components of another type, such as a number for a variable; 
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from operator import itemgetter
 
 from pyomo.common.numeric_types import native_types
 from pyomo.core.expr import numeric_expr as nodes
@@ -27,7 +29,7 @@ class Stamp:
     """
 
     def __init__(self, parts: Sequence):
-        self._places = {id(part): k for k, part in enumerate(parts)}
+        self._places, self._number = {id(part): k for k, part in enumerate(parts)}, len(parts)
         self._builders = {}
 
     def place(self, part) -> int:
@@ -39,50 +41,66 @@ class Stamp:
         # the expression is kept, so that no other one gets its id
         found = self._builders.get(id(expr))
         if found is None:
-            found = self._builders[id(expr)] = expr, _builder(expr, self._places)
-        return found[1](others)
+            found = self._builders[id(expr)] = expr, self.builder([expr])
+        return found[1](others)[0]
+
+    def builder(self, expressions: Sequence) -> Callable:
+        """Return the function from ``others`` to all ``expressions`` with them; nodes that these share are shared again."""
+        # constants, which contain no part, have negative places, until their number is known
+        places, constants, steps = dict(self._places), [], []
+        for node, arguments in _in_order(expressions, places):
+            where = [places[id(argument)] for argument in arguments]
+            if arguments and node.is_named_expression_type():
+                places[id(node)] = where[0]
+            elif all(place < 0 for place in where):
+                places[id(node)] = ~len(constants)
+                constants.append(node)
+            else:
+                places[id(node)] = self._number + len(steps)
+                steps.append((_maker(node), where))
+
+        def among_values(nodes_at):
+            return [~place if place < 0 else place + len(constants) for place in nodes_at]
+
+        steps = [(make, _getter(among_values(where))) for make, where in steps]
+        roots = among_values(places[id(expr)] for expr in expressions)
+
+        def build(others):
+            values = [*constants, *others]
+            for make, arguments in steps:
+                values.append(make(arguments(values)))
+            return [values[root] for root in roots]
+
+        return build
 
 
-def _builder(expr, places) -> Callable:
-    """The function from other components to the expression."""
-    places = dict(places)
-    steps = _steps(expr, places)
-    root = places[id(expr)]
-
-    def build(others):
-        values = list(others)
-        for make, arguments in steps:
-            values.append(arguments if make is None else make([values[k] for k in arguments]))
-        return values[root]
-
-    return build
-
-
-def _steps(expr, places):
-    """``(function, places of its arguments)`` of each node, after those of its arguments; ``(None, value)`` of constant ones."""
-    steps, parts, constant, waiting = [], len(places), set(), [expr]
+def _in_order(expressions, known):
+    """Yield each node that is not ``known``, after those in it, with its arguments."""
+    met, waiting = set(known), list(expressions)[::-1]
     while waiting:
         node = waiting[-1]
         arguments = node.args if node.__class__ not in native_types and node.is_expression_type() else ()
-        missing = [a for a in arguments if id(a) not in places]
-        if id(node) not in places and missing:
+        missing = [] if id(node) in met else [a for a in arguments if id(a) not in met]
+        if missing:
             waiting.extend(missing)
             continue
         waiting.pop()
-        if id(node) in places:
-            continue
-        if arguments and node.is_named_expression_type():
-            places[id(node)] = places[id(arguments[0])]
-            continue
-        where = [places[id(a)] for a in arguments]
-        places[id(node)] = parts + len(steps)
-        if constant.issuperset(where):
-            constant.add(places[id(node)])
-            steps.append((None, node))
-        else:
-            steps.append((_maker(node), where))
-    return steps
+        if id(node) not in met:
+            met.add(id(node))
+            yield node, arguments
+
+
+def _getter(places):
+    """The function from values to those at some ``places``, in a sequence."""
+    return itemgetter(*places) if len(places) > 1 else itemgetter(slice(places[0], places[0] + 1))
 
 
 def _maker(node):
-    return node.__class__ if node.__class__ in MADE_FROM_ARGUMENTS else node.create_node_with_local_data
+    """The function from arguments to a node like this one."""
+    cls = node.__class__
+    if cls is relations.InequalityExpression:
+        return partial(cls, strict=node.strict)
+    if isinstance(node, nodes.SumExpression):
+        # terms can be added to it
+        return lambda arguments: cls(list(arguments))
+    return cls if cls in MADE_FROM_ARGUMENTS else node.create_node_with_local_data

@@ -50,16 +50,21 @@ def add_step(block: BlockData, index: tuple, c, lean: float = 0.0) -> VarData:
     """
     systems = switched_systems(block)
     alpha, p, n = (variable[stored_index(index)] for variable in (block.alpha, block.p, block.n))
-    now = float(value_or_zero(c))  # start values may be numpy numbers, whose comparisons cannot be subtracted
-    starts = max(now, 0.0), max(-now, 0.0), 0.5 + lean * ((now > 0) - (now < 0))
-    for variable, start in zip((p, n, alpha), starts):
-        variable.set_value(start, skip_validation=True)
+    start_step((p, n, alpha), c, lean)
     insert(block.switching, index, without_unit(c) == p - n)
     insert(block.complementarity, (*index, 1), complements(alpha >= 0, n >= 0))
     insert(block.complementarity, (*index, 2), complements(1 - alpha >= 0, p >= 0))
     systems.steps.append(Step(alpha, c))
     systems.dependents.append(Dependents((p, n, alpha), (c,), step_values))
     return alpha
+
+
+def start_step(variables: tuple, c, lean: float = 0.0) -> None:
+    """Set the start values of p, n and alpha from the present value of c."""
+    now = float(value_or_zero(c))  # start values may be numpy numbers, whose comparisons cannot be subtracted
+    starts = max(now, 0.0), max(-now, 0.0), 0.5 + lean * ((now > 0) - (now < 0))
+    for variable, start in zip(variables, starts):
+        variable.set_value(start, skip_validation=True)
 
 
 def step_values(arguments: list[float]) -> list[float]:

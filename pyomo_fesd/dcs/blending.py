@@ -1,6 +1,7 @@
 """Write one Disjunction at one time: its multipliers, the blended equations (theory, eq. 7) and the way back to the sources.
 
-Takes: a ``ModeSystem`` or ``HysteresisSystem``, and the form that was chosen for it (None where one mode is left).
+Takes: a ``ModeSystem``, ``RecognisedSystem`` or ``HysteresisSystem``, and the form that was chosen for it (None where one mode is
+    left).
 Leaves: a block beside the Disjunction, of its name, with the components of the smallest form, ``mode`` (eq. 7) and ``own``
     (copies of variables for implicit modes), or blocks below for other forms and sizes; the record of multipliers; the Disjunction
     and its disjuncts are deactivated.
@@ -14,10 +15,12 @@ from pyomo.core import Block, Constraint, Set, Var
 from pyomo.core.base.block import BlockData
 
 from pyomo_fesd.core import GENERATED, exchanged, index_tuple, insert, sum_of, switched_systems
+from pyomo_fesd.dcs.blended_copies import BlendedCopies, can_be_copied
 from pyomo_fesd.dcs.continuation import Continuation
 from pyomo_fesd.dcs.forms import heaviside
 from pyomo_fesd.dcs.reading import split
 from pyomo_fesd.dcs.source_maps import source_maps
+from pyomo_fesd.dcs.weights import Weights
 
 
 def dcs_block(parent: BlockData) -> BlockData:
@@ -25,32 +28,65 @@ def dcs_block(parent: BlockData) -> BlockData:
     return _below(parent, GENERATED + 'dcs')
 
 
-def blend(system, form, defined) -> Callable:
-    """Write one Disjunction at one time, and deactivate the source.
+class Blender:
+    """Writes Disjunctions, each at one time; one that is built like another one becomes a copy of what was written for it.
 
     Parameters
     ----------
-    system : ModeSystem or HysteresisSystem
-    form : module of ``forms``, or None where one mode is left
     defined : ComponentMap VarData -> DisjunctionData
         receives the variables that the modes define
-
-    Returns
-    -------
-    callable
-        the sum of the multipliers of some modes, given by their numbers
+    copies : dict id of a ModeSystem -> BlendedCopies
+        those that are known, to which others are added; the model keeps the systems
     """
-    block, index, parts = _form_block(system, form), index_tuple(system.disjunction.index()), system.parts()
 
-    # for a single Disjunction at one time, functools.cache takes longer to set up than it saves
-    weights = {}
+    def __init__(self, defined, copies):
+        self._defined, self._copies, self._written, self._blocks = defined, copies, {}, {}
 
-    def weight(modes):
-        modes = tuple(modes)
-        if modes not in weights:
-            weights[modes] = 1.0 if len(modes) == len(system.modes) else form.weight(block, index, system, modes)
-        return weights[modes]
+    def blend(self, system, form) -> Callable:
+        """Write one Disjunction at one time, and deactivate the source.
 
+        Parameters
+        ----------
+        system : ModeSystem, RecognisedSystem or HysteresisSystem
+        form : module of ``forms``, or None where one mode is left
+
+        Returns
+        -------
+        callable
+            the sum of the multipliers of some modes, given by their numbers
+        """
+        block, index, parts = self._block(system, form), index_tuple(system.disjunction.index()), system.parts()
+        copies = self._copies_like(system)
+        if copies is None:
+            weight = _blend(block, index, system, form, parts)
+            if system.stated is not None and can_be_copied(system):
+                self._written[id(system.first)] = block, index, system, form
+        else:
+            weight = copies.write(block, index, system, parts)
+        for v in system.defined:
+            self._defined[v] = system.disjunction
+        _deactivate(block, system, parts)
+        return weight
+
+    def _copies_like(self, system):
+        """The copies of what was written for a system that is built like this one, or None; made for the first one that asks."""
+        like = id(system.first)
+        if like in self._written:
+            # at once, since the user may change what was written before there are further times
+            self._copies[like] = BlendedCopies(*self._written.pop(like))
+        return self._copies.get(like)
+
+    def _block(self, system, form):
+        """The block for one form of one Disjunction; that of Disjunctions that are built alike is sought once."""
+        key = id(system.disjunction.parent_component()), id(system.first)
+        if key not in self._blocks:
+            self._blocks[key] = _form_block(system, form)
+        return self._blocks[key]
+
+
+def _blend(block, index, system, form, parts):
+    """Write the multipliers and the blended equations; returns the weights of modes."""
+    weight = Weights(block, index, system, form)
     if form is None:
         _impose_only_mode(block, index, system)
     else:
@@ -58,9 +94,6 @@ def blend(system, form, defined) -> Callable:
         _add_blended_equations(block, index, system, weight, Continuation(block, _index_sets(system), index, system, form))
         _record_multipliers(block, parts, weight)
         _record_sources_of_form(block, index, system, form)
-        for v in system.equations.defined:
-            defined[v] = system.disjunction
-    _deactivate(block, system, parts)
     return weight
 
 
@@ -73,7 +106,7 @@ def _form_block(system, form):
     if block.component('mode') is None:
         sets = _index_sets(system)
         if form is not None:
-            form.declare(block, sets, form.size(system))
+            form.declare(block, sets, form.size(system.first))
         block.numbers = Set(dimen=1)
         block.mode = Constraint(*sets, block.numbers)
     for j in range(1 + len(block.numbers), 1 + _number_of_equations(system)):
@@ -92,7 +125,7 @@ def _kind(system, form):
     """What form and size a block has; empty for the smallest form, whose block is that of its Disjunction."""
     if form is None:
         return 'single_mode'
-    size = form.size(system)
+    size = form.size(system.first)
     return '' if form is heaviside and size == 1 else f'{form.NAME}_{size}'
 
 
@@ -102,9 +135,9 @@ def _index_sets(system):
 
 
 def _number_of_equations(system):
-    if system.equations is None:
+    if len(system.modes) == 1:
         return sum(1 for _ in system.modes[0].constraints())
-    return len(system.equations.defined)
+    return len(system.defined)
 
 
 def _impose_only_mode(block, index, system):

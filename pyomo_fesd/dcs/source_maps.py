@@ -41,7 +41,11 @@ class SourceMaps(AutoSlots.Mixin):
         """Enter that ``replacement`` replaces ``sources``, alone or with other components."""
         self.sources[replacement] = sources
         for source in sources:
-            self.replacements.setdefault(source, []).append(replacement)
+            # ``setdefault`` raises and catches an error where there is none
+            if source in self.replacements:
+                self.replacements[source].append(replacement)
+            else:
+                self.replacements[source] = [replacement]
 
 
 Block.register_private_data_initializer(SourceMaps, scope=_SCOPE)

@@ -27,12 +27,12 @@ class TimeVariables:
         return v in self._named or v.parent_component() in self._named
 
     def kind(self, v) -> tuple:
-        """Whether ``v`` is data of a derivative, and of a state; each component is looked up once."""
+        """Whether ``v`` is data of a derivative, and of a state, and the name of its unit; each component is looked up once."""
         component = v.parent_component()
         # by id: the model keeps its components
         found = self._kinds.get(id(component))
         if found is None:
-            found = self._kinds[id(component)] = (self.is_derivative(v), self.is_state(v))
+            found = self._kinds[id(component)] = (self.is_derivative(v), self.is_state(v), str(v.get_units()))
         return found
 
     def is_derivative(self, v) -> bool:

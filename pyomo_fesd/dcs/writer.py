@@ -11,10 +11,10 @@ from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunction
 
 from pyomo_fesd.core import FesdError, TimeIndex, TimeWriter, discretised, paused_collection, switched_systems
-from pyomo_fesd.dcs.blending import blend, dcs_block
+from pyomo_fesd.dcs.blending import Blender, dcs_block
 from pyomo_fesd.dcs.exclusion_pairs import write_exclusions
 from pyomo_fesd.dcs.forms import heaviside, hysteresis, stewart
-from pyomo_fesd.dcs.piecewise import PiecewiseRewriter
+from pyomo_fesd.dcs.piecewise import PiecewiseRewriter, may_contain_functions
 from pyomo_fesd.dcs.reading import (
     Analyses,
     Nesting,
@@ -68,18 +68,19 @@ class DcsWriter(TimeWriter):
             trees = [nesting.tree(d) for d in found]
             propositions = read_logic(_blocks(self.targets), trees, times)
             modes = modes_left(trees, propositions)
-            plain = [tree for tree in trees if tree.disjunction not in with_hysteresis and not _contains_blocks(tree)]
+            plain = [tree for tree in trees if tree.disjunction not in with_hysteresis and _holds_constraints_only(tree)]
             known = {tree: reader.recognise(tree, modes[tree]) for tree in plain}
             rewriter = PiecewiseRewriter(self.block, times, undo)
-            rewriter.replace_all([*_blocks(self.targets), *self._disjuncts(found)], _disjuncts_of(known))
+            rewriter.replace_all([*_blocks(self.targets), *self._disjuncts(found)], _disjuncts_of(known.values()))
             systems = [
                 known.get(tree) or _read_system(reader, tree, modes[tree], tree.disjunction in with_hysteresis) for tree in trees
             ]
             refuse_twice_defined(systems, defined)
             exclusions = read_exclusions(propositions, systems)
-            forms = [_form(self.form, system) for system in systems]
+            forms = _forms(self.form, systems)
             undo.pop_all()
-            weights = {system.tree: blend(system, form, defined) for system, form in zip(systems, forms)}
+            blender = Blender(defined, analyses.copies)
+            weights = {system.tree: blender.blend(system, form) for system, form in zip(systems, forms)}
             for proposition in propositions:
                 write_exclusions(dcs_block(proposition.constraint.parent_block()), proposition, exclusions, weights)
         self._analyses = None if discretised(self.wrt) else analyses
@@ -113,14 +114,14 @@ def _blocks(targets):
             yield from target.values() if not isinstance(target, BlockData) else [target]
 
 
-def _contains_blocks(tree):
-    """Whether a Block, which may be a Piecewise that is not replaced yet, lies in a disjunct."""
-    return any(Block in disjunct._ctypes for disjunct in tree.disjuncts())
+def _holds_constraints_only(tree):
+    """Whether piecewise functions that are not replaced yet could lie in the Constraints of the disjuncts only."""
+    return not any(map(may_contain_functions, tree.disjuncts()))
 
 
 def _disjuncts_of(systems):
     """The disjuncts of the systems that were recognised, by id."""
-    modes = (mode for system in systems.values() if system is not None for mode in system.modes)
+    modes = (mode for system in systems if system is not None for mode in system.modes)
     return {id(disjunct): disjunct for mode in modes for disjunct in mode.disjuncts}
 
 
@@ -130,6 +131,17 @@ def _read_system(reader, tree, modes, with_hysteresis):
         return reader.read(tree, modes)
     hysteresis.refuse_ambiguous(tree.disjunction, modes)
     return reader.read_hysteresis(tree, modes)
+
+
+def _forms(name, systems):
+    """The form of each system; of those that are built alike it is chosen once."""
+    known, forms = {}, []
+    for system in systems:
+        first = system.first
+        if id(first) not in known:
+            known[id(first)] = _form(name, first)
+        forms.append(known[id(first)])
+    return forms
 
 
 def _form(name, system):

@@ -48,6 +48,8 @@ def _varying_inside_stages(families, moving) -> list[dict]:
     if moving.held is None:
         return families
     held = ComponentSet(v for c in moving.held.values() for v in identify_variables(c.body))
+    if not held:
+        return families
     return [family for family in families if not any(v in held for v in family.values())]
 
 

@@ -17,12 +17,13 @@ Does not apply: to models that were discretised before.
 from functools import cache
 
 import numpy as np
+from pyomo.core import Var
 from pyomo.dae import ContinuousSet, DerivativeVar
 from pyomo.dae.misc import generate_finite_elements
 from pyomo.dae.plugins.colloc import Collocation_Discretization_Transformation
 from scipy.special import roots_jacobi, roots_legendre
 
-from pyomo_fesd.core import stored_index, weighted_sum
+from pyomo_fesd.core import add_copies, stored_index, weighted_sum
 
 
 @cache
@@ -62,6 +63,7 @@ class Collocation(Collocation_Discretization_Transformation):
         self._place_points(wrt, elements, tau)
         rates = self._adot[currentds], self._adotdot[currentds]
         _read_states_directly(block, wrt)
+        _make_variables(block, wrt)
         self._scheme = [_Scheme(wrt, elements, order, rate) for order, rate in enumerate(rates, start=1)]
         self._tau[currentds] = []
         super()._transformBlock(block, currentds)
@@ -103,7 +105,22 @@ def _read_states_directly(block, wrt):
         over = derivative.get_continuousset_list()
         if len(over) == 1 and over[0] is wrt:
             x = derivative.get_state_var()
-            derivative.set_derivative_expression(lambda *index, x=x: x[stored_index(index)])
+            by_time = x.index_set() is wrt
+            derivative.set_derivative_expression(x.__getitem__ if by_time else lambda *index, x=x: x[stored_index(index)])
+
+
+def _make_variables(block, wrt):
+    """Make the variables at the new points, in the order of pyomo.dae, which calls their rules for each of them."""
+    for variable in block.component_objects((Var, DerivativeVar), descend_into=True):
+        if variable.index_set() is wrt and not variable.is_reference() and _is_alike_everywhere(variable):
+            add_copies(variable, set(wrt) - set(variable._data))
+
+
+def _is_alike_everywhere(variable):
+    """Whether the data of a Var are made alike: rules that are functions may need components that are not expanded yet."""
+    rules = (variable._rule_init, variable._rule_bounds, variable._rule_domain)
+    by_pyomo = type(variable)._getitem_when_not_present is Var._getitem_when_not_present
+    return by_pyomo and all(rule is None or rule.constant() for rule in rules)
 
 
 class _Scheme:

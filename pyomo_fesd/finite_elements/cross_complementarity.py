@@ -10,11 +10,21 @@ from collections.abc import Iterator
 
 from pyomo.common.collections import ComponentSet
 from pyomo.contrib.fbbt.expression_bounds_walker import ExpressionBoundsVisitor
-from pyomo.core import Constraint, ConstraintList, RangeSet, Set, quicksum
+from pyomo.core import Constraint, ConstraintList, RangeSet, Set
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import Follower, MovingGrid, all_switched_systems, homotopy_hints, insert, is_generated, leaves_of
+from pyomo_fesd.core import (
+    Follower,
+    MovingGrid,
+    all_switched_systems,
+    expression_key,
+    homotopy_hints,
+    insert,
+    is_generated,
+    leaves_of,
+    sum_of,
+)
 from pyomo_fesd.finite_elements.mixed_complementarity import repeats_other_side
 from pyomo_fesd.finite_elements.time_complementarities import TimeComplementarity
 
@@ -83,41 +93,55 @@ def _pairs(condition, element, form) -> Iterator[tuple]:
         return
     G, H = condition.values(element, 0), condition.values(element, 1)
     if form == 'element':
-        yield (), (quicksum(G), quicksum(H))
+        yield (), (sum_of(G), sum_of(H))
     elif form == 'point':
-        yield from (((r,), (G_r, quicksum(H))) for r, G_r in enumerate(G, start=1))
+        yield from (((r,), (G_r, sum_of(H))) for r, G_r in enumerate(G, start=1))
     else:
         yield from (((r, s), (G_r, H_s)) for r, G_r in enumerate(G, start=1) for s, H_s in enumerate(H, start=1))
 
 
 def _add_signs(moving):
     """G >= 0 and H >= 0 at every point and after every jump, where the bounds of the variables do not imply it."""
-    block, bounds = moving.block, ExpressionBoundsVisitor()
+    block, signs = moving.block, _Signs()
     block.nonnegative = moving.nonnegative = ConstraintList()
     block.sign_after = moving.sign_after = Constraint(block.condition, block.element, [1, 2])
     for condition in moving.complementarities:
         for expr in (expr for pair in condition.sides.values() for expr in pair):
-            if not _never_negative(expr, bounds):
+            if not signs.never_negative(expr):
                 block.nonnegative.add(expr >= 0)
         for n, pair in condition.starts.items():
             for side, expr in enumerate(pair, start=1):
-                if not _never_negative(expr, bounds):
+                if not signs.never_negative(expr):
                     block.sign_after.add((condition.name, n, side), expr >= 0)
 
 
-def _never_negative(expr, bounds):
-    """Whether the bounds of the variables imply expr >= 0 for all values of mutable Params."""
-    if expr.is_variable_type():
-        low, high = expr.lower, expr.upper
-        return not _may_change(low) and not _may_change(high) and low is not None and low >= 0
-    if any(leaf.is_parameter_type() or (leaf.is_variable_type() and _bounds_may_change(leaf)) for leaf in leaves_of(expr)):
-        return False
-    low, _ = bounds.walk_expression(expr)
-    return low is not None and low >= 0
+class _Signs:
+    """Whether bounds imply a sign; of expressions that are built alike from variables with the same bounds one is examined."""
+
+    def __init__(self):
+        self._visitor, self._known = ExpressionBoundsVisitor(), {}
+
+    def never_negative(self, expr):
+        """Return whether the bounds of the variables imply expr >= 0 for all values of mutable Params."""
+        if expr.is_variable_type():
+            bounds = _bounds(expr)
+            return bounds is not None and bounds[0] is not None and bounds[0] >= 0
+        key, _ = expression_key([expr], _bounds)
+        if key is None or key not in self._known:
+            self._known[key] = self._is_implied(expr)
+        return self._known[key]
+
+    def _is_implied(self, expr):
+        if any(leaf.is_parameter_type() or (leaf.is_variable_type() and _bounds(leaf) is None) for leaf in leaves_of(expr)):
+            return False
+        low, _ = self._visitor.walk_expression(expr)
+        return low is not None and low >= 0
 
 
-def _bounds_may_change(v):
-    return _may_change(v.lower) or _may_change(v.upper)
+def _bounds(v):
+    """The bounds of a variable; None if they may change."""
+    low, high = v.lower, v.upper
+    return None if _may_change(low) or _may_change(high) else (low, high)
 
 
 def _may_change(bound):

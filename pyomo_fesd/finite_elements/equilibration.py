@@ -17,7 +17,7 @@ from math import prod
 from pyomo.core import Block, Constraint, Expression, quicksum
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import BranchConstraint, MovingGrid, Penalty, divided_by, homotopy_hints, unit_of
+from pyomo_fesd.core import BranchConstraint, MovingGrid, Penalty, divided_by, homotopy_hints, insert, sum_of, unit_of
 from pyomo_fesd.finite_elements.contacts import impulse_activity
 from pyomo_fesd.finite_elements.state_jumps import no_jump
 
@@ -58,15 +58,16 @@ def add_equilibration(moving: MovingGrid, mode: str, rho: float) -> None:
     block.activity = moving.activity = Expression(block.condition, block.element)
     for condition in independent:
         for n, activity in _activities(condition, moving.grid.elements):
-            block.activity[condition.name, n] = activity
+            block.activity[condition.name, n].set_value(activity)
     block.eta = moving.eta = Expression(block.element)
     block.equal_length = Constraint(block.element)
     block.equilibration = moving.equilibration = Complementarity(block.element)
     for e, f in moving.grid.inner_boundaries():
-        block.eta[e.n] = prod(_unchanged(moving, independent, e, f))
+        eta = block.eta[e.n]
+        eta.set_value(prod(_unchanged(moving, independent, e, f)))
         difference = (moving.element_length(f) - moving.element_length(e)) / e.length
-        block.equal_length.add(e.n, difference == 0)
-        block.equilibration.add(e.n, complements(difference**2 >= 0, block.eta[e.n] >= 0))
+        insert(block.equal_length, (e.n,), difference == 0)
+        insert(block.equilibration, (e.n,), complements(difference**2 >= 0, eta >= 0))
     block.equal_length.deactivate()
     block.deviation = Expression(expr=quicksum((r - 1) ** 2 for r in block.r.values() if not r.fixed))
     MODES[mode](block, rho)
@@ -77,7 +78,7 @@ def _activities(condition, elements):
     units = None
     for element in elements:
         if condition.points(element):
-            sums = [quicksum(condition.values(element, side)) for side in (0, 1)]
+            sums = [sum_of(condition.values(element, side)) for side in (0, 1)]
             units = units or list(map(unit_of, sums))
             G, H = map(divided_by, sums, units)
             yield element.n, G / (G + H + TINY)

@@ -1,4 +1,4 @@
-"""Discretise with pyomo.dae, expand hybrid components too, and undo the changes if it fails.
+"""Discretise with pyomo.dae, and expand hybrid components too; the caller undoes the changes if it fails.
 
 ``dae.collocation`` raises on a Disjunct, Disjunction or Complementarity over time (Pyomo issue #3101) and leaves the model half
 expanded.  Here, while pyomo.dae works, Disjuncts and Complementarities have the type Block (which expands by its rule),
@@ -39,7 +39,6 @@ from pyomo_fesd.core import (
     label_decimals,
     own_components,
     paused_collection,
-    restored_on_error,
     withheld_messages,
 )
 from pyomo_fesd.finite_elements.collocation import Collocation
@@ -79,7 +78,7 @@ def discretise(block: Block, wrt: ContinuousSet, shares: list[int], ncp: int, sc
         times only
     """
     _refuse_unexpandable(block, wrt)
-    with restored_on_error(block, wrt), paused_collection():
+    with paused_collection():
         inputs = read_fixed_inputs(block, wrt, controls)
         decimals = label_decimals(wrt, shares, ncp)
         place_boundaries(wrt, shares, decimals)
@@ -194,7 +193,7 @@ def _is_simple(component, wrt):
 def _make_missing(disjunct):
     """Make the missing data of a Disjunct by its rule."""
     for index in disjunct.index_set():
-        if index not in disjunct:
+        if index not in disjunct._data:
             # what ``disjunct[index]`` calls when it has searched the index set
             disjunct._getitem_when_not_present(index)
 

@@ -18,7 +18,7 @@ from pyomo.core.base.param import IndexedParam
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import FesdError, TimeIndex, declared, derivatives, is_indexed_by, own_blocks, strip_time
+from pyomo_fesd.core import FesdError, TimeIndex, derivatives, is_indexed_by, own_components, strip_time
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -30,7 +30,7 @@ REMEDY = (
     "give a time series with pyomo_fesd.signal, or name it in piecewise_constant if it is constant on each control stage; "
     "values that hold at these times only belong into constraints"
 )
-PLACES = {Block, Disjunct}
+PLACES = (Block, Disjunct)
 
 
 def read_fixed_inputs(block: Block, wrt: ContinuousSet, controls: Sequence) -> dict[str, dict]:
@@ -100,7 +100,7 @@ def complete_params(block: Block, wrt: ContinuousSet, controls: Sequence, error:
         naming a Param that has other values, or that cannot change
     """
     given = ComponentSet(controls)
-    for param in (p for place in own_blocks(block.model(), PLACES) for p in declared(place, {Param})):
+    for param in own_components(block.model(), Param, PLACES):
         if isinstance(param, IndexedParam) and is_indexed_by(param, wrt) and param not in given:
             if param.mutable:
                 _complete(param)

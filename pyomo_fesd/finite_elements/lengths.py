@@ -21,6 +21,7 @@ from pyomo_fesd.core import (
     MovingGrid,
     TimeIndex,
     derivatives,
+    entries_of,
     exchanged,
     homotopy_hints,
     is_discretisation_equation,
@@ -113,10 +114,11 @@ def _determining(model) -> Iterator[tuple]:
 def multiply_derivatives(moving: MovingGrid) -> None:
     """Multiply the derivative in every discretisation equation by (r_n sigma)**k, and by the unit that pyomo.dae leaves out."""
     owner, times = moving.grid.element_of(), TimeIndex(moving.wrt)
+    speeds = {element.n: moving.speed(element) for element in moving.grid.elements}
     for derivative, order, equations in discretisation_equations(moving.block.model(), moving.wrt):
         units = [time_unit(derivative.get_state_var()[index], derivative[index]) for index in list(equations)[:1]]
-        for index, equation in equations.items():
-            rate = moving.speed(owner[times.time(equation)])
+        for index, equation in entries_of(equations):
+            rate = speeds[owner[times.time(equation)].n]
             xdot = derivative[index]
             scaled = rate * xdot if order == 1 else rate**order * xdot
             scaled = scaled if units == [None] else scaled * units[0]

@@ -18,10 +18,10 @@ Does not apply: with one collocation point, whose polynomial has no slope; at bo
 """
 
 import numpy as np
-from pyomo.core import Constraint, Expression, quicksum
+from pyomo.core import Constraint, Expression
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import BranchConstraint, MovingGrid, homotopy_hints, insert, interpolation_weights, weighted_sum
+from pyomo_fesd.core import BranchConstraint, MovingGrid, homotopy_hints, insert, interpolation_weights, sum_of, weighted_sum
 from pyomo_fesd.finite_elements.equilibration import TINY
 
 #: H'(0), relative to the sum of its terms' sizes, below which H leaves zero without a slope.
@@ -51,14 +51,12 @@ def add_sliding_exits(moving: MovingGrid) -> None:
 def _add_exit_condition(block, condition, e, f, slope, end):
     """Add the exit of one time complementarity at the boundary between elements e and f."""
     index, values = (condition.name, e.n), [condition.sides[t][0] for t in e.points]
-    G = quicksum(weight * value for weight, value in zip(end, values) if weight)
+    G = sum_of([weight * value for weight, value in zip(end, values) if weight])
     H = [condition.starts.get(f.n, condition.sides[f.left])[1], *(condition.sides[t][1] for t in f.points)]
-    block.slope[index] = 1 - _relative_slope(slope, H) / FLAT
-    flat = _positive(block.slope[index])
+    flat = _positive(_stated(block.slope[index], 1 - _relative_slope(slope, H) / FLAT))
     if min(end) < 0:
         # with Radau the last collocation point is the end, and its value not negative
-        block.below[index] = -_relative_slope(end, values) / FLAT
-        flat += _positive(block.below[index])
+        flat += _positive(_stated(block.below[index], -_relative_slope(end, values) / FLAT))
     leaves = block.activity[index] * (1 - block.activity[condition.name, f.n])
     arrival = insert(block.arrival, index, G == 0)
     pair = insert(block.exit, index, complements(G**2 >= 0, leaves * flat >= 0))
@@ -69,6 +67,12 @@ def _relative_slope(weights, values):
     """sum_j w_j f_j in relation to sum_j |w_j| f_j."""
     sizes = map(abs, weights)
     return weighted_sum(list(zip(weights, values))) / (weighted_sum(list(zip(sizes, values))) + TINY)
+
+
+def _stated(named, expr):
+    """A named Expression that gets the content ``expr``."""
+    named.set_value(expr)
+    return named
 
 
 def _positive(expr):

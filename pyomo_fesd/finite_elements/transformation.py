@@ -69,6 +69,9 @@ from pyomo_fesd.finite_elements.time_complementarities import (
 )
 from pyomo_fesd.finite_elements.untaken_kinks import warn_untaken_kinks
 
+#: Types of blocks that may contain variables.
+PLACES = (Block, Disjunct)
+
 
 @dataclass
 class _Switching:
@@ -318,8 +321,22 @@ def _describe_boundaries(moving):
 
 def _relate_variables(moving, switching):
     """Tell the solver which variables are one quantity over time, and have one size, and which belong to one element."""
-    variables = own_components(moving.block.model(), Var, descend_into=(Block, Disjunct))
-    families = list(TimeIndex(moving.wrt).families_in(variables).values())
+    families = list(_variables_over_time(moving.block.model(), TimeIndex(moving.wrt)).values())
     homotopy_hints(moving.block).alike += [tuple(family.values()) for family in families]
     if switching:
         add_chain(moving, families)
+
+
+def _variables_over_time(model, times):
+    """All variables over time, by name; of most disjuncts, which are many, it is the binary of the indicator only."""
+    families = times.families_in(own_components(model, Var, PLACES, enter=_has_more_than_indicator))
+    for name, disjuncts in times.families_in(own_components(model, Disjunct, PLACES)).items():
+        binaries = {t: disjunct.binary_indicator_var for t, disjunct in disjuncts.items()}
+        families.setdefault(f'{name}.binary_indicator_var', {}).update(binaries)
+    return families
+
+
+def _has_more_than_indicator(place):
+    """Whether a block is not a disjunct, or has variables beside the binary of its indicator."""
+    types = place._ctypes
+    return place.ctype is not Disjunct or types[Var][2] > 1 or Block in types or Disjunct in types

@@ -81,3 +81,18 @@ def test_components_of_another_type_are_declared_under_it(m):
     assert names(declared(m, {pyo.Block})) == ['x', 'b']
     m.reclassify_component_type('x', pyo.Var)
     assert names(declared(m, {pyo.Var})) == ['x', 'y', 'again']
+
+
+def test_blocks_below_are_passed_over_on_request():
+    m = pyo.ConcreteModel()
+    m.b = pyo.Block([1, 2], rule=lambda b, i: b.add_component('z', pyo.Var()))
+    m.b[1].c = pyo.Block()
+    m.b[1].c.w = pyo.Var()
+    asked = []
+
+    def enter(block):
+        asked.append(block.name)
+        return block.name != 'b[1]'
+
+    assert names(own_components(m, pyo.Var, pyo.Block, enter=enter)) == ['b[2].z']
+    assert asked == ['b[1]', 'b[2]']

@@ -47,3 +47,19 @@ def test_what_contains_no_part_is_shared(m):
 
 def test_place_of_a_part(m):
     assert Stamp([m.x[2], m.x[1]]).place(m.x[1]) == 1
+
+
+def test_expressions_that_are_built_together_share_what_they_shared(m):
+    common = pyo.exp(m.x[0])
+    first = [m.x[0], common + m.p[0], 4.0, 2 * common <= m.p[0] * m.e[3], common]
+    x, total, number, row, alone = Stamp([m.x[0], m.p[0]]).builder(first)([m.x[1], m.p[1]])
+    assert x is m.x[1] and number == 4.0
+    assert compare_expressions(total, pyo.exp(m.x[1]) + m.p[1])
+    assert compare_expressions(row, 2 * pyo.exp(m.x[1]) <= m.p[1] * (pyo.exp(m.x[3]) + 1))
+    assert total.arg(0) is alone is row.arg(0).arg(1)
+
+
+@pytest.mark.parametrize('strict', [True, False])
+def test_inequalities_stay_strict_or_not(m, strict):
+    (row,) = Stamp([m.x[0]]).builder([pyo.inequality(m.x[0], 5, strict=strict)])([m.x[1]])
+    assert row.strict is strict and row.arg(0) is m.x[1]

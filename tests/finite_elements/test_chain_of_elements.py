@@ -9,7 +9,7 @@ from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
 from pyomo_fesd.core import TimeIndex, all_hints, moving_grids
-from tests.models import dcs
+from tests.models import dcs, tank
 from tests.problems import coupled_relays, two_carts, two_experiments
 from tests.problems.running import move, transform
 
@@ -216,3 +216,24 @@ def test_with_hysteresis_it_takes_an_element_to_spare(seed):
         pyomo_fesd.simulate(m)
         m.theta.unfix()
         assert pyomo_fesd.certify(m).certified == (spare and relays.is_minimum)
+
+
+# Indicators
+
+
+def test_indicators_in_equations_of_a_user_are_variables_of_an_element():
+    def build():
+        m = tank()
+        m.open = pyo.Var(m.t, initialize=0.5)
+        m.shown = pyo.Constraint(m.t, rule=lambda m, t: m.open[t] == m.full[t].binary_indicator_var)
+        return m
+
+    m = transform(build(), 4)
+    elements = moving_grids(m)[m.t].grid.elements
+    for part, element in zip(chain(m), elements):
+        own = ComponentSet(part.own)
+        assert all(d[t].binary_indicator_var in own for d in (m.full, m.empty) for t in element.own_labels)
+        ends = [(first.name, last.name) for first, last in part.ends]
+        assert tuple(m.full[t].binary_indicator_var.name for t in (element.left, element.right)) in ends
+    alike = [set(map(id, group)) for group in all_hints(m).alike]
+    assert {id(m.full[t].binary_indicator_var) for t in m.t} in alike

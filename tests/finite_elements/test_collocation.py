@@ -61,3 +61,39 @@ def test_few_points_are_those_of_pyomo(scheme, ncp):
     for name in ('tau_points', 'adot', 'adotdot', 'afinal'):
         if theirs.get(name) is not None:
             assert np.array(ours[name]) == pytest.approx(np.array(theirs[name]), abs=1e-11)
+
+
+class Numbered(pyo.Var):
+    """A Var that gives its data a value by itself."""
+
+    def _getitem_when_not_present(self, index):
+        found = super()._getitem_when_not_present(index)
+        found.value = 10 * index
+        return found
+
+
+def over_time(transformation):
+    """A model with variables that are declared in several ways, on two elements."""
+    m = pyo.ConcreteModel()
+    m.t = dae.ContinuousSet(bounds=(0, 1))
+    m.plain, m.bounded = pyo.Var(m.t), pyo.Var(m.t, initialize=2, bounds=(0, 3), domain=pyo.NonNegativeReals)
+    m.by_rule = pyo.Var(m.t, initialize=lambda m, t: t + 1, bounds=lambda m, t: (0, t + 5))
+    m.by_dict = pyo.Var(m.t, initialize={0: 7, 1: 8})
+    m.both, m.sparse = pyo.Var(m.t, [1, 2], initialize=4), pyo.Var(m.t, dense=False, initialize=5)
+    m.own = type('Own', (Numbered, pyo.Var(m.t).__class__), {})(m.t)
+    m.again = pyo.Reference(m.both[:, 1])
+    m.rate = dae.DerivativeVar(m.plain)
+    m.bounded[0].setub(9)
+    m.bounded[0].fix(1)
+    transformation.apply_to(m, wrt=m.t, nfe=2, ncp=3, scheme='LAGRANGE-RADAU')
+    return m
+
+
+def test_variables_at_new_points_are_those_of_pyomo():
+    def variables(m):
+        data = m.component_data_objects(pyo.Var)
+        return {v.name: (v.value, v.lb, v.ub, v.domain, v.fixed, v.stale) for v in data}
+
+    ours, theirs = (variables(over_time(t)) for t in (Collocation(), pyo.TransformationFactory('dae.collocation')))
+    assert ours == theirs and len(ours) == 9 * 7
+    assert ours['own[0.5]'][0] == 5

@@ -244,6 +244,24 @@ def test_sides_whose_bounds_do_not_say_their_sign_get_one_at_each_time():
     assert texts == sorted(f'0  <=  0.7 - V[{t}]' for t in m.t)
 
 
+def test_sides_get_no_inequality_at_the_times_at_which_bounds_say_their_sign():
+    m = weir.build()
+    given = list(m.t)
+    for t in given:
+        m.V[t].setub(0.7)
+    texts = [str(c.expr) for c in block(move(m, 3)).nonnegative.values()]
+    assert sorted(texts) == sorted(f'0  <=  0.7 - V[{t}]' for t in m.t if t not in given)
+
+
+@pytest.mark.parametrize('low', [0.7, 0.6])
+def test_a_bound_that_may_change_does_not_say_the_sign_of_a_side(low):
+    m = weir.build()
+    m.top = pyo.Param(mutable=True, initialize=low)
+    for t in m.t:
+        m.V[t].setub(m.top)
+    assert len(block(move(m, 3)).nonnegative) == len(m.t)
+
+
 @pytest.mark.parametrize('scheme', SCHEMES)
 def test_no_side_is_negative_anywhere(scheme):
     m = solve(move(weir.build(), 5, 3, scheme=scheme))

@@ -10,6 +10,7 @@ from pyomo.mpec import Complementarity, complements
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
+from pyomo_fesd.core import restored_on_error
 from pyomo_fesd.finite_elements.expansion import discretise
 from tests.models import dcs
 from tests.problems import free_start
@@ -30,7 +31,8 @@ def states(points=(0, 2)):
 
 def expand(m, nfe=3, ncp=2, scheme=RADAU):
     """Discretise without making anything movable; returns the model."""
-    discretise(m, m.t, [nfe], ncp, scheme)
+    with restored_on_error(m, m.t):
+        discretise(m, m.t, [nfe], ncp, scheme)
     return m
 
 

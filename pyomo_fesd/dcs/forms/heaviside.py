@@ -18,7 +18,7 @@ from collections.abc import Iterable
 from pyomo.core import RangeSet
 from pyomo.core.base.block import BlockData
 
-from pyomo_fesd.core import add_step, declare_step, product_of, stored_index, sum_of
+from pyomo_fesd.core import add_step, declare_step, product_of, start_step, stored_index, sum_of
 from pyomo_fesd.dcs.reading import ModeSystem, not_covered_once
 
 NAME = 'heaviside'
@@ -59,10 +59,18 @@ def _indices(block, index):
 
 def add(block: BlockData, index: tuple, system: ModeSystem) -> None:
     """Add one time of one Disjunction."""
-    # several start on the side of c_k, but not at the bound: with 1/2 the solver took longer, from the bound much longer
-    lean = 0.4 if len(block.functions) > 1 else 0.0
     for key, position in zip(_indices(block, index), system.regions.geometry.implicants.used):
-        add_step(block, key, system.regions.functions[position], lean)
+        add_step(block, key, system.regions.functions[position], _lean(block))
+
+
+def _lean(block):
+    """The start of several alpha on the side of c_k, but not at the bound: with 1/2 the solver took longer, from it much longer."""
+    return 0.4 if len(block.functions) > 1 else 0.0
+
+
+def start(block: BlockData, variables: tuple, arguments: tuple) -> None:
+    """Set the start values of the ``variables`` of one step from its switching function."""
+    start_step(variables, *arguments, _lean(block))
 
 
 def weight(block: BlockData, index: tuple, system: ModeSystem, modes):

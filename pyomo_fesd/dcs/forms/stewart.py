@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from pyomo.core.base.block import BlockData
 
-from pyomo_fesd.core import add_smallest, declare_smallest, stored_index, without_unit
+from pyomo_fesd.core import add_smallest, declare_smallest, start_smallest, stored_index, without_unit
 from pyomo_fesd.dcs.reading import ModeSystem
 
 NAME = 'stewart'
@@ -51,6 +51,11 @@ def add(block: BlockData, index: tuple, system: ModeSystem) -> None:
         index,
         [sum(-c if sign > 0 else c for sign, c in zip(pattern, functions)) for pattern in patterns],
     )
+
+
+def start(block: BlockData, variables: tuple, arguments: tuple) -> None:
+    """Set the start values of the ``variables`` of one time from the functions g_i."""
+    start_smallest(variables, arguments)
 
 
 def weight(block: BlockData, index: tuple, system: ModeSystem, modes):

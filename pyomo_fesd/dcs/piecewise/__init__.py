@@ -7,5 +7,5 @@ it, in a block for each quantity (``generated_blocks.py``); ``replaced_constrain
 expressions.
 """
 
-from pyomo_fesd.dcs.piecewise.piecewise_rewriter import PiecewiseRewriter
+from pyomo_fesd.dcs.piecewise.piecewise_rewriter import PiecewiseRewriter, may_contain_functions
 from pyomo_fesd.dcs.piecewise.replaced_constraints import replacement_of

@@ -69,7 +69,7 @@ class PiecewiseRewriter:
         return not self.waits(named)
 
     def replace_all(self, blocks, without=()) -> None:
-        """Replace everything below ``blocks``; the Constraints of those whose ids are in ``without`` contain no functions."""
+        """Replace everything below ``blocks``, except in those whose ids are in ``without``."""
         for block in blocks:
             _refuse_written_by_pyomo(block, self._times)
             found = _Survey(block, self._times, without)
@@ -133,7 +133,13 @@ WRITERS = {
     Complementarity: PiecewiseRewriter.write_complementarity,
 }
 SOUGHT = frozenset(WRITERS) | {PiecewiseLinearFunction}
-SOUGHT_BESIDE = SOUGHT - {Constraint}
+#: Those that a place can hold beside Constraints; a Block may be a Piecewise.
+SOUGHT_BESIDE = SOUGHT - {Constraint} | set(EVERYWHERE)
+
+
+def may_contain_functions(disjunct) -> bool:
+    """Return whether something else than the Constraints of a disjunct may contain a piecewise function."""
+    return not disjunct._ctypes.keys().isdisjoint(SOUGHT_BESIDE)
 
 
 def _refuse_written_by_pyomo(block, times):
@@ -169,12 +175,12 @@ class _Survey:
 
     def __init__(self, block, times, without):
         self.piecewise, self.functions, sources = [], [], {}
-        for place in block.block_data_objects(active=True, descend_into=EVERYWHERE):
+        for place in _active_places(block, without):
             if univariate.is_piecewise(place) and times.time(place) is not None:
                 self.piecewise.append(place)
                 continue
             generated = is_generated(place)
-            for component in declared(place, SOUGHT_BESIDE if id(place) in without else SOUGHT):
+            for component in declared(place, SOUGHT):
                 if not component.active:
                     continue
                 if component.ctype is PiecewiseLinearFunction:
@@ -183,6 +189,18 @@ class _Survey:
                     for data in _active(component):
                         sources[id(data)] = data
         self.sources = list(sources.values())
+
+
+def _active_places(block, without):
+    """Yield ``block`` and the active blocks and disjuncts below it, each once, also those that a Reference names."""
+    met, waiting = set(without), [block] if block.active else []
+    while waiting:
+        place = waiting.pop()
+        if id(place) not in met:
+            met.add(id(place))
+            yield place
+            found = [b for c in declared(place, EVERYWHERE) if c.active for b in c.values() if b.active and id(b) not in met]
+            waiting += reversed(found)
 
 
 def _active(component):

@@ -16,4 +16,4 @@ from pyomo_fesd.dcs.reading.mode_contents import refuse_twice_defined
 from pyomo_fesd.dcs.reading.mode_equations import ModeEquations
 from pyomo_fesd.dcs.reading.restricted_functions import arguments_of, factors_of, split
 from pyomo_fesd.dcs.reading.sign_implicants import not_covered_once
-from pyomo_fesd.dcs.reading.system import Analyses, HysteresisSystem, ModeSystem, SystemReader
+from pyomo_fesd.dcs.reading.system import Analyses, HysteresisSystem, ModeSystem, RecognisedSystem, SystemReader

@@ -80,7 +80,13 @@ def active_constraints(disjunct) -> list:
     if Block in disjunct._ctypes:
         return list(disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
     # most disjuncts hold a few Constraints, and there is one at every time: Pyomo's walk takes longer than all the rest
-    return [data for c in declared(disjunct, CONSTRAINTS) if c.active for data in data_of(c) if data.active]
+    found = []
+    for component in declared(disjunct, CONSTRAINTS):
+        if component.is_indexed():
+            found += [data for data in data_of(component) if data.active] if component.active else ()
+        elif component.active and len(component):
+            found.append(component)
+    return found
 
 
 def enclosing_disjunct(component):
@@ -152,7 +158,8 @@ class Nesting:
     def tree(self, disjunction) -> DisjunctionTree:
         """Return the tree of an outermost Disjunction."""
         nested = list(self._below(disjunction))
-        for d in (disjunction, *nested):
+        _refuse_inclusive_or(disjunction)
+        for d in nested:
             _refuse_inclusive_or(d)
             if self._times.time(d) != self._times.time(disjunction):
                 raise FesdError(d, f"it is nested in '{disjunction.name}', which is of another time", "nest modes of one time")
@@ -172,10 +179,13 @@ class Nesting:
         if not possible:
             raise FesdError(disjunction, "all its disjuncts are switched off", "activate one, or deactivate the Disjunction")
         for disjunct in possible:
-            for paths in product(*(self._modes(inner, with_hysteresis) for inner in self._inside.get(disjunct, ()))):
+            if disjunct not in self._inside:
+                # most have none; there is one at every time, and the product takes longer than all the rest
+                yield Mode((disjunct,), (disjunct,))
+                continue
+            for paths in product(*(self._modes(inner, with_hysteresis) for inner in self._inside[disjunct])):
                 below = chain(*(path.disjuncts for path in paths))
-                ends = tuple(chain(*(path.innermost for path in paths)))
-                yield Mode((disjunct, *below), ends or (disjunct,))
+                yield Mode((disjunct, *below), tuple(chain(*(path.innermost for path in paths))))
 
 
 def _is_possible(disjunction, disjunct, with_hysteresis):

@@ -2,17 +2,19 @@
 
 from itertools import chain
 
-from pyomo.common.collections import ComponentMap, ComponentSet
+from pyomo.common.collections import ComponentSet
 from pyomo.core import Block, BooleanVar, Constraint, LogicalConstraint, Var
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.dae import DerivativeVar
 from pyomo.gdp import Disjunct
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import FesdError, declared, variables_that_count
+from pyomo_fesd.core import FesdError, variables_that_count
 
 #: Types of the components of most disjuncts; one Var is the binary of the indicator.
-PLAIN, VARIABLES = {BooleanVar, Var, Constraint}, {Var}
+PLAIN = {BooleanVar, Var, Constraint}
+#: Place of the number of components of a type in Pyomo's own table of types.
+COUNT = 2
 #: Components that a disjunct over time cannot contain (a Disjunct only if it belongs to another tree): cause and fix.
 REFUSED_INSIDE = {
     Disjunct: (
@@ -40,7 +42,7 @@ def _other_components(disjunct):
     ctypes = disjunct._ctypes
     if Block in ctypes:
         return disjunct.component_objects(descend_into=Block)
-    plain = ctypes.keys() <= PLAIN and len(declared(disjunct, VARIABLES)) == 1
+    plain = ctypes.keys() <= PLAIN and ctypes[Var][COUNT] == 1
     return () if plain else disjunct.component_map().values()
 
 
@@ -85,13 +87,13 @@ def refuse_twice_defined(systems, known) -> None:
     known : ComponentMap VarData -> DisjunctionData
         the variables that Disjunctions transformed earlier define
     """
-    owners = ComponentMap(known)
+    owners = {id(v): disjunction for v, disjunction in known.items()}
     for system in systems:
-        for v in system.equations.defined if system.equations is not None else ():
-            if v in owners:
+        for v in system.defined:
+            if id(v) in owners:
                 raise FesdError(
                     v,
-                    f"both '{owners[v].name}' and '{system.disjunction.name}' define it",
+                    f"both '{owners[id(v)].name}' and '{system.disjunction.name}' define it",
                     "let each Disjunction define a contribution of its own, and add them up: m.dx[t] == m.F1[t] + m.F2[t]",
                 )
-            owners[v] = system.disjunction
+            owners[id(v)] = system.disjunction
