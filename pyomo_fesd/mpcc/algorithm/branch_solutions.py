@@ -23,7 +23,7 @@ NEAR, NEARER = 1e-2, 0.1
 #: A more even solution may cost this much more, relative: the error of uneven elements, not another minimum.
 AS_GOOD = 1e-4
 #: One without places of least extent may cost this much more: the error of uneven ones, of any order.
-UNEVEN = 1e-2
+UNEVEN = 2e-2
 #: A branch that is to be below another objective is left where multipliers stay above this, relative to that: where it has a
 #: solution at all, a violation of 1e-4 is worth a tenth of the objective there.
 STEEP = 1e3
