@@ -64,22 +64,32 @@ class Completions:
         form = self._options.relaxation
         self._paths = PATHS.get(form) or tuple((form, looser) for looser in LOOSER)
         self._form, self._share = self._paths[0][0], 1.0
-        self._deadline, self._promise, self._possible = setup.deadline.part(SHARE), -np.inf, False
-        self._objectives, self._around, self._best = [], set(), None
+        self._deadline, self._possible = setup.deadline.part(SHARE), False
+        # objectives of the last relaxation that holds, and of the last one
+        self._promise, self._last = -np.inf, np.inf
+        self._objectives, self._around, self._best, self._left = [], set(), None, None
 
     def follow(self, start):
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
         for form, looser in self._paths:
-            self._form, self._best, self._share = form, None, 1.0
             is_last = (form, looser) == self._paths[-1]
-            leads_away = self._down(start, self._options.eps_init * looser, is_last)
+            leads_away = self._follow(form, start, self._options.eps_init * looser, is_last)
             if leads_away and not is_last:
                 continue
-            self._improve()
             if not self._possible or not (leads_away or self._promising()) or self._deadline.expired():
                 break
+        if self._left is not None and self._possible and self._is_far_below(self._last):
+            self._follow(*self._left, True)
         if self.run.point is not None:
             self._certify()
+
+    def _follow(self, form, w, eps, is_last):
+        """Follow one path from ``w``; return whether it leads away from all solutions."""
+        self._form, self._best, self._share = form, None, 1.0
+        leads_away = self._down(w, eps, is_last)
+        if is_last or not leads_away:
+            self._improve()
+        return leads_away
 
     def _down(self, w, eps, is_last_path=True):
         """Rounds with ever smaller eps, each from the relaxation before.
@@ -92,7 +102,10 @@ class Completions:
         while eps * ROUND_OFF >= least and not self._deadline.expired():
             is_last = eps * self._options.eps_factor * ROUND_OFF < least
             relaxed, end = self._round(w, eps, is_on_the_way=not is_last)
-            if relaxed.status in INFEASIBLE or (may_lead_away and relaxed.stopped):
+            if may_lead_away and relaxed.stopped:
+                self._left = self._form, relaxed.w, eps * self._options.eps_factor
+                return True
+            if relaxed.status in INFEASIBLE:
                 return True
             if None not in (before, end) and abs(end - before) <= SAME_BRANCH * abs(before):
                 return False
@@ -106,24 +119,33 @@ class Completions:
             before = self._best
             if before is None:
                 return
+            w = before.w
             for eps in AROUND:
                 if self._deadline.expired():
                     return
-                self._round_about(self._best.w, eps)
+                best = self._best
+                relaxed = self._round_about(w, eps)
+                # where its branch is no better, a relaxation leads on itself
+                w = self._best.w if relaxed is None or self._best is not best else relaxed.w
             if not self._best.f < before.f - PROGRESS * max(1.0, abs(before.f)):
                 return
 
     def _round_about(self, w, eps):
-        """A round from ``w``, unless it was run before: it starts cold, and would have the same end."""
+        """The relaxation of a round from ``w``; None if it was run before: it starts cold, and would have the same end."""
         key = self._form, eps, w.tobytes(), self._c.lbx.tobytes()
-        if key not in self._around:
-            self._around.add(key)
-            self._round(w, eps)
+        if key in self._around:
+            return None
+        self._around.add(key)
+        return self._round(w, eps)[0]
 
     def _promising(self):
         """Whether the relaxations promise a much better point than the best one."""
+        return self._is_far_below(self._promise)
+
+    def _is_far_below(self, f):
+        """Whether an objective is much lower than that of the best point, or there is none."""
         point = self.run.point
-        return point is None or point.f - self._promise > GAP * abs(point.f)
+        return point is None or point.f - f > GAP * abs(point.f)
 
     def _names_a_branch(self, relaxed):
         """Whether a relaxation itself names a branch: it is not infeasible, and most of its pairs are decided."""
@@ -142,8 +164,9 @@ class Completions:
         relaxed = self._subsolves.relax(self._form, w, eps, None, int(self._share * self._options.relaxation_iterations))
         self._share = BUDGET if relaxed.stopped else self._share
         self._subsolves.keep_least_infeasible(relaxed.w)
-        if eps <= AROUND[0] * ROUND_OFF and self._subsolves.usable(relaxed):
-            self._promise = self._c.evaluate(relaxed.w).f
+        if eps <= AROUND[0] * ROUND_OFF:
+            self._last = self._c.evaluate(relaxed.w).f
+            self._promise = self._last if self._subsolves.usable(relaxed) else self._promise
         if not self._is_known(relaxed):
             seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
             end = self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))

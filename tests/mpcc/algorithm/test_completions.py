@@ -9,6 +9,7 @@ import pytest
 from problems import small_mpccs
 from problems.parts import parts
 
+from pyomo_fesd.mpcc.algorithm import completions as completions_file
 from pyomo_fesd.mpcc.algorithm.completions import AROUND, BUDGET, Completions
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
 from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
@@ -90,12 +91,48 @@ def test_a_relaxation_with_a_solution_that_is_known_is_not_completed_again():
 
 
 def test_relaxations_around_a_point_are_not_repeated():
-    # another round of cycles, after the second path, finds no better point
+    # further cycles find no better point: the second one has a start of its own for the last eps, as no relaxation comes before
     p, rounds, _ = completions(lambda x: (0.3, True))
     rounds._branch_of_completion(p.compiled.x0, 1.0)
-    for _ in range(2):
+    for _ in range(3):
         rounds._improve()
-    assert [entry.eps for entry in p.kinds('relaxation')] == pytest.approx(AROUND)
+    assert [entry.eps for entry in p.kinds('relaxation')] == pytest.approx([*AROUND, AROUND[-1]])
+
+
+@pytest.mark.parametrize('better', [True, False])
+def test_a_relaxation_whose_branch_is_no_better_leads_on_itself(better, monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    rounds._branch_of_completion(p.compiled.x0, 1.0)
+    first, starts = rounds._best, []
+
+    def a_round(w, eps):
+        starts.append(w)
+        if better:
+            rounds._best = replace(first, f=first.f - 1.0)
+        return SimpleNamespace(w='relaxed'), None
+
+    monkeypatch.setattr(rounds, '_round', a_round)
+    monkeypatch.setattr(rounds, '_round_about', lambda w, eps: a_round(w, eps)[0])
+    monkeypatch.setattr(completions_file, 'CYCLES', 1)
+    rounds._improve()
+    assert starts[0] is first.w and (starts[1] is first.w if better else starts[1] == 'relaxed')
+
+
+def test_a_path_that_was_left_goes_on_where_the_other_one_does_not_keep_what_relaxations_promise(monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    relax, asked = p.subsolves.relax, []
+
+    def stopped(form, w, eps, *args):
+        asked.append((form, eps))
+        result = relax(form, w, eps, *args)
+        return replace(result, status='User_Requested_Stop') if len(asked) == 1 else result
+
+    monkeypatch.setattr(p.subsolves, 'relax', stopped)
+    monkeypatch.setattr(rounds, '_is_far_below', lambda f: True)
+    rounds.follow(p.compiled.x0)
+    forms = [form for form, _ in asked]
+    assert forms[:2] == ['scholtes', 'elastic'] and forms[-1] == 'scholtes'
+    assert next(eps for form, eps in asked[2:] if form == 'scholtes') == pytest.approx(1e-1)
 
 
 def test_no_relaxation_follows_an_infeasible_one(monkeypatch):
