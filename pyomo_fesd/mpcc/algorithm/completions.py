@@ -119,21 +119,26 @@ class Completions:
             before = self._best
             if before is None:
                 return
-            w = before.w
-            for eps in AROUND:
-                if self._deadline.expired():
-                    return
-                best = self._best
-                relaxed = self._round_about(w, eps)
-                # where its branch is no better, a relaxation leads on itself
-                w = self._best.w if relaxed is None or self._best is not best else relaxed.w
+            self._cycle()
             if not self._best.f < before.f - PROGRESS * max(1.0, abs(before.f)):
                 return
 
+    def _cycle(self):
+        """A round for each eps from the best point; and one on from the first relaxation, where all of these only promise more."""
+        before, first = self._best, None
+        for eps in AROUND:
+            relaxed = self._round_about(self._best.w, eps)
+            first = first or relaxed
+        if first is not None and self._best is before and self._is_far_below(self._last):
+            self._round_about(first.w, AROUND[-1])
+
     def _round_about(self, w, eps):
-        """The relaxation of a round from ``w``; None if it was run before: it starts cold, and would have the same end."""
+        """The relaxation of a round from ``w``; None after the deadline, and if it was run before.
+
+        It starts cold, and would have the same end.
+        """
         key = self._form, eps, w.tobytes(), self._c.lbx.tobytes()
-        if key in self._around:
+        if key in self._around or self._deadline.expired():
             return None
         self._around.add(key)
         return self._round(w, eps)[0]

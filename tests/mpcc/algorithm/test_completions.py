@@ -9,7 +9,6 @@ import pytest
 from problems import small_mpccs
 from problems.parts import parts
 
-from pyomo_fesd.mpcc.algorithm import completions as completions_file
 from pyomo_fesd.mpcc.algorithm.completions import AROUND, BUDGET, Completions
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
 from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
@@ -91,31 +90,31 @@ def test_a_relaxation_with_a_solution_that_is_known_is_not_completed_again():
 
 
 def test_relaxations_around_a_point_are_not_repeated():
-    # further cycles find no better point: the second one has a start of its own for the last eps, as no relaxation comes before
+    # another round of cycles, after the second path, finds no better point
     p, rounds, _ = completions(lambda x: (0.3, True))
     rounds._branch_of_completion(p.compiled.x0, 1.0)
-    for _ in range(3):
+    for _ in range(2):
         rounds._improve()
-    assert [entry.eps for entry in p.kinds('relaxation')] == pytest.approx([*AROUND, AROUND[-1]])
+    assert [entry.eps for entry in p.kinds('relaxation')] == pytest.approx(AROUND)
 
 
-@pytest.mark.parametrize('better', [True, False])
-def test_a_relaxation_whose_branch_is_no_better_leads_on_itself(better, monkeypatch):
+@pytest.mark.parametrize('better, far_below, goes_on', [(False, True, True), (False, False, False), (True, True, False)])
+def test_a_relaxation_leads_on_itself_where_the_rounds_of_a_cycle_only_promise_more(better, far_below, goes_on, monkeypatch):
     p, rounds, _ = completions(lambda x: (0.3, True))
     rounds._branch_of_completion(p.compiled.x0, 1.0)
-    first, starts = rounds._best, []
+    best, asked = rounds._best, []
 
     def a_round(w, eps):
-        starts.append(w)
+        asked.append((eps, w))
         if better:
-            rounds._best = replace(first, f=first.f - 1.0)
-        return SimpleNamespace(w='relaxed'), None
+            rounds._best = replace(best, f=best.f - 1.0)
+        return SimpleNamespace(w=w + 1.0), None
 
     monkeypatch.setattr(rounds, '_round', a_round)
-    monkeypatch.setattr(rounds, '_round_about', lambda w, eps: a_round(w, eps)[0])
-    monkeypatch.setattr(completions_file, 'CYCLES', 1)
-    rounds._improve()
-    assert starts[0] is first.w and (starts[1] is first.w if better else starts[1] == 'relaxed')
+    monkeypatch.setattr(rounds, '_is_far_below', lambda f: far_below)
+    rounds._cycle()
+    assert [eps for eps, _ in asked] == [*AROUND, *[AROUND[-1]] * goes_on]
+    assert not goes_on or np.array_equal(asked[-1][1], best.w + 1.0)
 
 
 def test_a_path_that_was_left_goes_on_where_the_other_one_does_not_keep_what_relaxations_promise(monkeypatch):
