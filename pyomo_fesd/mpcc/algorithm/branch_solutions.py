@@ -209,6 +209,11 @@ def _is_clearly_above(f, below):
     return f > below + AS_GOOD * max(1.0, abs(below))
 
 
-def as_good(point):
-    """Return the largest objective of a certified point that may take the place of ``point``."""
-    return point.f + UNEVEN * max(1.0, abs(point.f))
+def as_good(point, lowest):
+    """Return the largest objective of a certified point that may take the place of ``point``.
+
+    It is that of the ``lowest`` point of the run, if there is one, that counts: one point a little dearer than the one before would
+    lead up step by step.
+    """
+    f = point.f if lowest is None else min(point.f, lowest.f)
+    return f + UNEVEN * max(1.0, abs(f))

@@ -107,13 +107,13 @@ class Branches:
         return certificate.certified
 
     def take_certified(self):
-        """Make the best certified solution found the incumbent, if that is not certified and not better by ``UNEVEN``.
+        """Make the best certified solution found the incumbent, if that is not certified and the solution is ``as_good``.
 
         Those without variables at their lower bound come first: where there are any, orders of changes may stay open.
         """
         best = self.run.point
         if best is not None and not best.certificate.certified:
-            enough, number = as_good(best), self.neighbours.number_of_short
+            enough, number = as_good(best, self.run.lowest), self.neighbours.number_of_short
             known = chain(self.solutions.up_to(enough, lambda w: not number(w)), self.solutions.up_to(enough))
             self.run.point = next(known, best)
 

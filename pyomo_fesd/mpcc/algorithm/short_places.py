@@ -50,9 +50,7 @@ class ShortPlaces:
         counts if it is ``as_good``.  Solutions that are known come first, also without such places beside one without them; each of
         them, and each branch, is tried once.
         """
-        # of the lowest point: one that is a little dearer than the one before would lead up step by step
-        lowest = self._branches.run.lowest
-        return self._fewer(point, as_good(point if lowest is None or point.f < lowest.f else lowest))
+        return self._fewer(point, as_good(point, self._branches.run.lowest))
 
     def _fewer(self, point, enough):
         number = self._neighbours.number_of_short(point.w)
