@@ -27,6 +27,9 @@ UNEVEN = 2e-2
 #: A branch that is to be below another objective is left where multipliers stay above this, relative to that: where it has a
 #: solution at all, a violation of 1e-4 is worth a tenth of the objective there.
 STEEP = 1e3
+#: A branch with decisions of its sides is left where its violation does not halve in so many iterations: of those that stall as
+#: long, few have a solution, and the others used two thirds of all iterations of hard problems.
+STALL = 50
 #: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
 #: one it came from an unbounded relaxation.
 UNBOUNDED = 1e15
@@ -67,6 +70,7 @@ class BranchSolutions:
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
         self.at_once, self._known = at_once and self._c.eta.numel() > 0, {}
+        self._stall = STALL if self.at_once else None
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -120,7 +124,7 @@ class BranchSolutions:
         return Point(found.nlp, found.f, found.certificate, found.equal) if found.certificate.feasible else None
 
     def _solution(self, w, zero, duals, below, **more):
-        more |= {'steepest': STEEP * max(1.0, abs(below))}
+        more |= {'steepest': STEEP * max(1.0, abs(below)), 'stall': self._stall}
         found = self._solve(w, zero, duals, below, **more)
         if found.nlp is not None and not found.nlp.solved and more.get('max_iter') in MORE:
             # feasible, so the branch has a solution, but not at its minimum yet
@@ -193,7 +197,7 @@ class BranchSolutions:
         ``w`` is exactly complementary, and its decisions hold.  None if the bounds of the branch contradict each other.
         """
         zero = self._subsolves.sets(w, self._tolerances.biactive).zero
-        return self.imposed(w, zero, True, self._subsolves.attempt)
+        return self.imposed(w, zero, True, self._subsolves.attempt, stall=self._stall)
 
     def imposed(self, w, zero, among, solve, **more):
         """A branch NLP from ``w`` with the decisions that its eta asks for, ``among`` some; a tentative one only if it can be."""

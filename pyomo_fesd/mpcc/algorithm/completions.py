@@ -201,8 +201,7 @@ class Completions:
         """
         end = None
         for _ in range(ATTEMPTS):
-            completed, is_complete, note = self._complete(w, seconds)
-            self._subsolves.note(note, completed)
+            completed, is_complete = self._subsolves.completed(self._complete, w, seconds)
             self._possible = self._possible or is_complete
             if to_the_end and not is_complete:
                 break

@@ -9,7 +9,7 @@ import numpy as np
 
 from pyomo_fesd.core import DeferredInterrupt, phase
 from pyomo_fesd.mpcc.algorithm.state import LogEntry, Outcome, Run, Setup, Stop, Tolerances
-from pyomo_fesd.mpcc.nlp import DIVERGING, nlp_solver
+from pyomo_fesd.mpcc.nlp import DIVERGING, STALLED, nlp_solver
 from pyomo_fesd.mpcc.subproblems import (
     RELAXATIONS,
     Branch,
@@ -32,9 +32,9 @@ SUGGESTION = {'mip_max_nodes': 100, 'mip_max_improving_sols': 1, 'presolve': 'of
 SHARE, LEAST_TIME = 0.2, 0.5
 #: Statuses of a problem that an NLP solver found infeasible: the model's own rows may hold there, the pairs do not.
 INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
-#: Status where Ipopt cannot make the violation smaller, and the violation from which on its point is none: a multiplier may be so
-#: large that the objective owes all to what is left, as with a force of 1e7 at a gap of 1e-8.
-STUCK, LEFT = 'Restoration_Failed', 1e-8
+#: Statuses where Ipopt cannot make the violation smaller, and the violation from which on such a point is none: a multiplier may be
+#: so large that the objective owes all to what is left, as with a force of 1e7 at a gap of 1e-8.
+STUCK, LEFT = ('Restoration_Failed', STALLED), 1e-8
 #: Ipopt scales rows and an objective down whose gradients at the start of an NLP have larger entries than this; and rows where
 #: parts have extents, without impacts.
 STEEP, STEEPEST_ROW = 1e2, 1e4
@@ -184,13 +184,20 @@ class Subsolves:
             if best is None or self._c.evaluate(w).f < self._c.evaluate(best).f:
                 self.run.complementary = w
 
+    def completed(self, complete, w, seconds):
+        """The completion of ``w`` by ``complete`` (that of ``Setup``), and whether it is complete."""
+        with self._timed('recovery') as started:
+            completed, is_complete, note = complete(w, seconds)
+        self._log('recovery', 0.0, completed, 0, note, started)
+        return completed, is_complete
+
     def note(self, message, w):
         """Log a message without running a solver."""
         self._log('recovery', 0.0, w, 0, message, time.perf_counter())
 
     def usable(self, result):
         """Whether an NLP's point can be used: solved, or stopped where the model's constraints hold, but not as infeasible."""
-        most = min(LEFT, self.tolerances.feasibility) if result.status == STUCK else self.tolerances.feasibility
+        most = min(LEFT, self.tolerances.feasibility) if result.status in STUCK else self.tolerances.feasibility
         return result.solved or (result.status not in USELESS and self.violation(result.w) <= most)
 
     def violation(self, w):

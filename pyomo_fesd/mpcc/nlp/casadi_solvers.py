@@ -4,6 +4,7 @@ import ctypes
 import io
 import os
 from abc import abstractmethod
+from collections import deque
 from dataclasses import replace
 from functools import cache, cached_property
 
@@ -19,6 +20,7 @@ from pyomo_fesd.mpcc.nlp.solver import (
     IPOPT,
     IPOPT_WARM,
     RUNNING,
+    STALLED,
     VIOLATED,
     NlpResult,
     NlpSolver,
@@ -51,7 +53,7 @@ UNO_TYPES = {0: int, 1: float, 2: bool, 3: str}
 
 
 class _StopCallback(ca.Callback):
-    """Asks the solver to stop at the deadline, at the iteration limit of a call, where multipliers diverge, or at Ctrl-C."""
+    """Asks the solver to stop at the deadline, at the limits of a call, or at Ctrl-C."""
 
     def __init__(self, n, m, p, deadline):
         super().__init__()
@@ -59,15 +61,22 @@ class _StopCallback(ca.Callback):
         self._g, self._lam_g = map(ca.nlpsol_out().index, ('g', 'lam_g'))
         self.construct('watch', {})
 
-    def begin(self, max_iter, steepest, lbg, ubg):
+    def begin(self, max_iter, steepest, stall, lbg, ubg):
         """Begin a call with its limits."""
         self._left, self._steepest, self._running = np.inf if max_iter is None else max_iter, steepest, 0
+        # the least violation up to each of the last iterations
+        self._least = None if stall is None else deque(maxlen=stall + 1)
         self._lbg, self._ubg = (np.asarray(bound, dtype=float) for bound in (lbg, ubg))
 
     @property
-    def diverges(self):
-        """Whether multipliers were above their limit for too long."""
-        return self._running >= RUNNING
+    def status(self):
+        """The status of a call that was stopped by its own limits; None of another one."""
+        return DIVERGING if self._running >= RUNNING else STALLED if self._stalls else None
+
+    @property
+    def _stalls(self):
+        least = self._least
+        return bool(least) and len(least) == least.maxlen and least[-1] > max(VIOLATED, least[0] / 2)
 
     def get_n_in(self):
         return ca.nlpsol_n_out()
@@ -86,17 +95,18 @@ class _StopCallback(ca.Callback):
 
     def eval_buffer(self, arg, res):
         self._left -= 1
-        if self._steepest < np.inf:
-            self._running = self._running + 1 if self._is_steep(arg) else 0
-        res[0].cast('d')[0] = self._left < 0 or self.diverges or self._deadline.expired() or self.interrupt.pressed
+        if self._steepest < np.inf or self._least is not None:
+            self._look_at(*(np.frombuffer(arg[i].cast('B')) for i in (self._g, self._lam_g)))
+        res[0].cast('d')[0] = self._left < 0 or bool(self.status) or self._deadline.expired() or self.interrupt.pressed
         return 0
 
-    def _is_steep(self, arg):
-        """Whether a row is violated, and a multiplier is above its limit."""
-        g, lam_g = (np.frombuffer(arg[i].cast('B')) for i in (self._g, self._lam_g))
-        if np.abs(lam_g).max(initial=0.0) <= self._steepest:
-            return False
-        return max((self._lbg - g).max(initial=0.0), (g - self._ubg).max(initial=0.0)) > VIOLATED
+    def _look_at(self, g, lam_g):
+        """Count iterations with a violated row and a multiplier above its limit; keep the least violation."""
+        violation = max((self._lbg - g).max(initial=0.0), (g - self._ubg).max(initial=0.0))
+        is_steep = violation > VIOLATED and np.abs(lam_g).max(initial=0.0) > self._steepest
+        self._running = self._running + 1 if is_steep else 0
+        if self._least is not None:
+            self._least.append(min([violation, *list(self._least)[-1:]]))
 
 
 class _CasadiNlp(NlpSolver):
@@ -156,10 +166,10 @@ class _CasadiNlp(NlpSolver):
             self._made[warm] = ca.nlpsol(self._name, self.PLUGIN, self._problem, settings)
         return self._made[warm]
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stall=None):
         """Solve from ``w0``; see ``NlpSolver``."""
         solver = self._solver_for(duals is not None)
-        self._watch.begin(max_iter, steepest, lbg, ubg)
+        self._watch.begin(max_iter, steepest, stall, lbg, ubg)
         start = {} if duals is None else {'lam_x0': duals.lam_x, 'lam_g0': duals.lam_g}
         given = {'x0': w0, 'p': p, 'lbx': lbx, 'ubx': ubx, 'lbg': lbg, 'ubg': ubg} | start
         with DeferredInterrupt() as self._watch.interrupt:
@@ -172,7 +182,7 @@ class _CasadiNlp(NlpSolver):
                 return self._failed(w0, p, len(lbg))
         stats = solver.stats()
         w, lam_g, lam_x = (result[key].full().ravel() for key in ('x', 'lam_g', 'lam_x'))
-        status = DIVERGING if self._watch.diverges else self._status(stats)
+        status = self._watch.status or self._status(stats)
         return NlpResult(w, float(result['f']), status, _iterations(stats), lam_g, lam_x)
 
     def _failed(self, w0, p, m, status='error'):
@@ -219,7 +229,7 @@ class CasadiUno(_CasadiNlp):
         self._varying, self._g = rows_with_variables(g, x), ca.Function('g', [x, p], [ca.densify(g)])
         super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, derivatives, options)
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stall=None):
         """Solve from ``w0``; see ``NlpSolver``."""
         varying = self._varying
         g, lam_g = self._g(w0, p).full().ravel(), np.zeros(len(varying))
@@ -227,7 +237,7 @@ class CasadiUno(_CasadiNlp):
             return self._failed(w0, p, len(varying), 'infeasible')
         if duals is not None:
             duals = replace(duals, lam_g=duals.lam_g[varying])
-        result = super().solve(w0, p, lbx, ubx, lbg[varying], ubg[varying], duals, max_iter, steepest)
+        result = super().solve(w0, p, lbx, ubx, lbg[varying], ubg[varying], duals, max_iter, steepest, stall)
         lam_g[varying] = result.lam_g
         return replace(result, lam_g=lam_g)
 

@@ -43,10 +43,12 @@ SOLVED = (
     'Converged with feasible KKT point',
     'optimal',
 )
-#: Status of a run that a limit of iterations or time has stopped.
-STOPPED = ('User_Requested_Stop', 'Maximum_Iterations_Exceeded', 'iteration or time limit', 'maxIterations')
+#: Status of a run that was stopped as it did not halve the violation of its rows in the iterations of the call's limit.
+STALLED = 'Violation_Stalls'
+#: Status of a run that a limit has stopped.
+STOPPED = ('User_Requested_Stop', 'Maximum_Iterations_Exceeded', 'iteration or time limit', 'maxIterations', STALLED)
 #: Status of a run that was stopped as rows seem to contradict each other: in so many iterations running one was violated by more
-#: than the second, and a multiplier was above the limit of the call.
+#: than the second, and a multiplier was above the limit of the call.  A violation below the second one does not stall.
 DIVERGING, RUNNING, VIOLATED = 'Multipliers_Diverge', 30, 1e-8
 #: A row without variables may miss its bounds by this much.
 ROW_TOLERANCE = 1e-8
@@ -138,7 +140,7 @@ class NlpSolver(ABC):
         pass
 
     @abstractmethod
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stall=None):
         """Solve from ``w0``; an unsolved problem gives a status, never an error.
 
         Infinite bounds are ``np.inf``; a row or variable with two of them is free, one with equal bounds is an equation or fixed.
@@ -151,6 +153,9 @@ class NlpSolver(ABC):
             iterations that this call may use, where they can be counted
         steepest : float
             limit of the multipliers of rows, where the solver shows them on its way: with larger ones, it ends as ``DIVERGING``
+        stall : int, optional
+            iterations in which the largest violation of a row has to halve, where the solver shows it; if it does not, the solve
+            ends as ``STALLED``
 
         Returns
         -------

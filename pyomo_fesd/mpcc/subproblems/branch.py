@@ -84,8 +84,8 @@ class Branch:
             whether ``w`` may be far from the solution
         box : (array, array), optional
             a trust region: bounds of w besides its own
-        more : ``max_iter`` and ``steepest`` of ``NlpSolver.solve``; ``duals``, the result of a relaxation or branch with the
-            multipliers to start from
+        more : ``max_iter``, ``steepest`` and ``stall`` of ``NlpSolver.solve``; ``duals``, the result of a relaxation or branch with
+            the multipliers to start from
 
         Returns
         -------

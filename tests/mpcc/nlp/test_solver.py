@@ -12,7 +12,17 @@ from pyomo_fesd import FesdError
 from pyomo_fesd.mpcc.compile.derivatives import automatic
 from pyomo_fesd.mpcc.nlp.casadi_solvers import derivative_functions
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
-from pyomo_fesd.mpcc.nlp.solver import ACCEPTABLE, DIVERGING, NLP_SOLVERS, RUNNING, SOLVED, NlpResult, NlpSolver, nlp_solver
+from pyomo_fesd.mpcc.nlp.solver import (
+    ACCEPTABLE,
+    DIVERGING,
+    NLP_SOLVERS,
+    RUNNING,
+    SOLVED,
+    STALLED,
+    NlpResult,
+    NlpSolver,
+    nlp_solver,
+)
 
 SOLVERS = ['ipopt', 'uno', 'cyipopt', 'pounce']
 #: The limit of iterations in each solver's own words.
@@ -134,6 +144,16 @@ def test_multipliers_that_stay_above_their_limit_end_the_solve(steepest, diverge
     assert (result.status == DIVERGING) == diverges
     if diverges:
         assert result.iterations < RUNNING and not (result.solved or result.stopped)
+
+
+@pytest.mark.parametrize(('constant', 'stall', 'stalls'), [(1.0, 3, True), (1.0, None, False), (0.0, 3, False)])
+def test_a_violation_that_does_not_halve_ends_the_solve(constant, stall, stalls):
+    # without the constant each of Newton's iterations takes the violation to a third
+    x, p = ca.SX.sym('x'), ca.SX(0, 1)
+    problem = nlp_solver('ipopt')('parabola', x, p, x, x**16 + constant, {'max_iter': 300})
+    result = problem.solve(np.array([2.0]), [], np.array([-INF]), np.array([INF]), np.zeros(1), np.zeros(1), stall=stall)
+    assert (result.status == STALLED) == stalls
+    assert not stalls or (result.stopped and not result.solved)
 
 
 def test_options_of_the_user_pass_through_and_win(solver):
