@@ -101,7 +101,7 @@ class BranchSolutions:
         It has the decisions in force at the point, with which the LPEC found its direction.
         """
         equal = self._subsolves.in_force(point.w, point.equal)
-        solved, equal = self._with_all(self._subsolves.branch(point.w, zero, equal, 0.0), zero, equal)
+        solved, equal = self._with_all(self._subsolves.branch(point.w, zero, equal, 0.0, stall=self._stall), zero, equal)
         return None if solved is None else self._point(self._measured(_Solution(nlp=solved, equal=equal)), np.inf, enough)
 
     def _with_all(self, solved, zero, equal, left=ASKED, **more):
@@ -197,7 +197,7 @@ class BranchSolutions:
         ``w`` is exactly complementary, and its decisions hold.  None if the bounds of the branch contradict each other.
         """
         zero = self._subsolves.sets(w, self._tolerances.biactive).zero
-        return self.imposed(w, zero, True, self._subsolves.attempt, stall=self._stall)
+        return self.imposed(w, zero, True, self._subsolves.attempt)
 
     def imposed(self, w, zero, among, solve, **more):
         """A branch NLP from ``w`` with the decisions that its eta asks for, ``among`` some; a tentative one only if it can be."""

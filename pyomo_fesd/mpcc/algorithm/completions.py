@@ -67,7 +67,9 @@ class Completions:
         self._deadline, self._possible = setup.deadline.part(SHARE), False
         # objectives of the last relaxation that holds, and of the last one
         self._promise, self._last = -np.inf, np.inf
-        self._objectives, self._around, self._best, self._left = [], set(), None, None
+        self._objectives, self._around, self._left = [], set(), None
+        # the best points of the path, and of all solutions
+        self._best = self._solved = None
 
     def follow(self, start):
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
@@ -171,7 +173,7 @@ class Completions:
         self._subsolves.keep_least_infeasible(relaxed.w)
         if eps <= AROUND[0] * ROUND_OFF:
             self._last = self._c.evaluate(relaxed.w).f
-            self._promise = self._last if self._subsolves.usable(relaxed) else self._promise
+            self._promise = self._last if self._subsolves.holds(relaxed) else self._promise
         if not self._is_known(relaxed):
             seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
             end = self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))
@@ -218,23 +220,36 @@ class Completions:
 
     def _keep(self, solved, equal=None):
         """Keep a feasible point that is better than the best of the path, or of all; its certificate comes at the end."""
-        f = self._c.evaluate(solved.w).f
-        if self._best is not None and f >= self._best.f:
-            return
         certificate = self._subsolves.measure(solved.w)
-        if certificate.feasible:
-            self._best = Point(solved, f, replace(certificate, grade=Stationarity.UNTRIED), equal)
-            if self.run.point is None or f < self.run.point.f:
-                self.run.point = self._best
+        if not certificate.feasible:
+            return
+        point = Point(solved, self._c.evaluate(solved.w).f, replace(certificate, grade=Stationarity.UNTRIED), equal)
+        self._best, self.run.point = (_lower(best, point) for best in (self._best, self.run.point))
+        if solved.solved:
+            self._solved = _lower(self._solved, point)
 
     def _certify(self):
-        """The certificate of the best point, and descent from it."""
-        best = self.run.point
+        """The certificate of the best point, and descent from it; where it is not certified, from the best solution of an NLP.
+
+        Where an NLP was stopped the constraints hold, but nothing may lead on from there.
+        """
+        best, solved = self.run.point, self._solved
         self._c.widen()
         if best.equal is None:
             # no NLP's solution: it is judged as it is, and its branch may have a better one
             self.run.point = replace(best, certificate=self._subsolves.judge(best.w))
             self._branches.explore_from(best.w, True)
         else:
-            self.run.point = replace(best, certificate=self._subsolves.certify(best.nlp, best.equal))
+            self.run.point = self._judged(best)
             self._branches.improve_from(self.run.point, True)
+        if solved is not None and solved is not best and not self.run.point.certificate.certified:
+            self._branches.improve_from(self._judged(solved), True)
+
+    def _judged(self, point):
+        """A point with its certificate."""
+        return replace(point, certificate=self._subsolves.certify(point.nlp, point.equal))
+
+
+def _lower(best, point):
+    """The one of lower objective; ``best`` may be None."""
+    return point if best is None or point.f < best.f else best

@@ -10,7 +10,9 @@ from problems import small_mpccs
 from problems.parts import parts
 
 from pyomo_fesd.mpcc.algorithm.completions import AROUND, BUDGET, Completions
+from pyomo_fesd.mpcc.nlp import STALLED
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
+from pyomo_fesd.mpcc.subproblems import G_ZERO, H_ZERO
 from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
 from pyomo_fesd.solvers.options import MpecHybridConfig
 
@@ -58,6 +60,18 @@ def test_a_completion_is_kept_as_it_is_if_its_branch_is_no_better():
     rounds._branch_of_completion(p.compiled.x0, 1.0)
     assert p.run.point.f == pytest.approx(0.5)
     assert p.run.point.certificate.grade is Stationarity.UNTRIED
+
+
+def test_where_the_best_point_is_not_certified_the_best_solution_is():
+    p, rounds, _ = completions(lambda x: (1.0, True))
+    p.branches.descend = lambda point, worth: None
+    none = np.zeros(0, dtype=bool)
+    stopped = p.subsolves.branch(np.array(p.point(x=0.9, y=0.0)), np.array([H_ZERO]), none, 0.0, max_iter=0)
+    solved = p.subsolves.branch(np.array(p.point(x=0.0, y=0.9)), np.array([G_ZERO]), none, 0.0)
+    for result in (solved, replace(stopped, status=STALLED)):
+        rounds._keep(result, none)
+    rounds._certify()
+    assert p.run.point.certificate.grade is Stationarity.B and p.run.point.f == pytest.approx(1.0)
 
 
 def to_other_branches():
