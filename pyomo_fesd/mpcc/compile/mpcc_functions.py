@@ -10,7 +10,9 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
+from scipy import sparse
 
+from pyomo_fesd.mpcc.compile.casadi_matrices import between, entries
 from pyomo_fesd.mpcc.compile.derivatives import ModelDerivatives
 from pyomo_fesd.mpcc.compile.last_points import LastPoints
 from pyomo_fesd.mpcc.compile.numeric_function import NumericFunction
@@ -98,6 +100,27 @@ class MpccFunctions:
         numbers = ca.vertcat(self.kind(0, 1), *(ca.vec(J.nz[:]) for J in blocks))
         function = ca.Function('jacobian', list(at), [ca.densify(slopes), ca.densify(numbers)])
         return NumericFunction(function), pattern, slopes.nnz()
+
+    @cached_property
+    def _curvature(self):
+        """Function of the nonzeros of the upper triangle of the Lagrangian's Hessian, and their rows and columns."""
+        m, q = len(self.lbg), self.pairs
+        factors = self.kind.sym('factors', m + 2 * q)
+        of_g, of_sides = between(factors, 0, m), between(factors, m, m + 2 * q)
+        if self.short:
+            rows = ca.vertcat(self.g, self.G, self.H)
+            upper = ca.triu(ca.hessian(self.f + (ca.dot(factors, rows) if m + q else 0), self.x)[0])
+        else:
+            of_z = ca.vertcat(of_sides, self.kind(self.inner - 2 * q, 1))
+            upper = self.derivatives.hessian(self.x, self.p, ca.vertcat(self.kind(1), self.kind(1, 1)), of_g, of_z)
+        function = ca.Function('curvature', [self.x, self.p, factors], [ca.densify(upper.nz[:])])
+        return NumericFunction(function), *entries(upper)
+
+    @property
+    def has_penalty(self) -> bool:
+        """Whether there are penalty terms."""
+        cost = self._functions.cost.functions
+        return bool(cost.linear[1].nnz or cost.constants[1] or any((k.rows == 1).any() for k in cost.classes))
 
     @property
     def short(self) -> bool:
@@ -194,6 +217,14 @@ class MpccFunctions:
     def stacked_jacobian(self, w):
         """The Jacobian of g, G, H and the decisions' equations, one upon another (scipy csr), at ``w``."""
         return self._differentiated(w, self.parameters)[0]
+
+    def hessian(self, w, of_g, of_sides):
+        """The Hessian (scipy csr) of f + of_g g + of_sides (G, H) at ``w``."""
+        function, row, column = self._curvature
+        (numbers,) = function(w, self.parameters, np.concatenate([of_g, of_sides]))
+        off = row != column
+        places = np.concatenate([row, column[off]]), np.concatenate([column, row[off]])
+        return sparse.csr_matrix((np.concatenate([numbers, numbers[off]]), places), shape=(len(w), len(w)))
 
     def _gradients(self, w, parameters):
         function, pattern, _ = self._jacobian

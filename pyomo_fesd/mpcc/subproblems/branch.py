@@ -20,6 +20,7 @@ from pyomo_fesd.mpcc.subproblems.active_set import FREE
 from pyomo_fesd.mpcc.subproblems.differences import Differences
 from pyomo_fesd.mpcc.subproblems.impact_sides import give_interior
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, infeasible
+from pyomo_fesd.mpcc.subproblems.newton import Newton, Tolerances
 from pyomo_fesd.mpcc.subproblems.side_constraints import settle, with_shares
 from pyomo_fesd.mpcc.subproblems.single_rows import fix_single
 
@@ -49,23 +50,38 @@ class Branch:
     """
 
     def __init__(self, c, sides, make):
-        self._c, self._sides = c, sides
-        weight, z = ca.SX.sym('weight'), ca.SX.sym('z', c.inner)
-        inner = [*sides.chosen, *range(2 * c.pairs, z.numel())]
-        rows = take(z, inner)
-        nlp = composed(c, Outer(z, ca.SX(0, 1), weight, ca.SX(0), rows, weight))
-        self._pattern = csr_pattern(nlp.derivatives.jacobian)
-        self._rows = [nlp.x, nlp.p], [nlp.g]
-        m = len(c.lbg)
-        self._differences = Differences(c, nlp, np.array([*range(m), *(m + i for i in inner)], dtype=int))
-        given = nlp.x, nlp.p, nlp.f, nlp.g
-        exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': max(OPTIMALITY * min(1.0, c.scale.f), LEAST)}
-        self._nlp, self._far = (make('branch', *given, budget, nlp.derivatives) for budget in (NEAR | exact, exact))
+        self._c, self._sides, self._make = c, sides, make
+        self._rows = [*sides.chosen, *range(2 * c.pairs, c.inner)]
+        self._optimality = max(OPTIMALITY * min(1.0, c.scale.f), LEAST)
+        self._newton = Newton(c, sides.chosen, Tolerances(FEASIBILITY, self._optimality))
+
+    # most branches near the end of a relaxation need no NLP solver
+
+    @cached_property
+    def _nlp(self):
+        weight, z = ca.SX.sym('weight'), ca.SX.sym('z', self._c.inner)
+        return composed(self._c, Outer(z, ca.SX(0, 1), weight, ca.SX(0), take(z, self._rows), weight))
+
+    @cached_property
+    def _solvers(self):
+        """Those for starts near to the solution and far from it."""
+        nlp = self._nlp
+        exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': self._optimality}
+        return [self._make('branch', nlp.x, nlp.p, nlp.f, nlp.g, given, nlp.derivatives) for given in (NEAR | exact, exact)]
+
+    @cached_property
+    def _pattern(self):
+        return csr_pattern(self._nlp.derivatives.jacobian)
+
+    @cached_property
+    def _differences(self):
+        m = len(self._c.lbg)
+        return Differences(self._c, self._nlp, np.array([*range(m), *(m + i for i in self._rows)], dtype=int))
 
     @cached_property
     def _values(self):
         # few branches have a row without free variables
-        return ca.Function('rows', *self._rows)
+        return ca.Function('rows', [self._nlp.x, self._nlp.p], [self._nlp.g])
 
     def solve(self, w, zero, equal=None, weight=0.0, settled=ROW_TOLERANCE, far=False, box=None, **more):
         """Solve the branch ``zero`` from ``w``.
@@ -138,6 +154,11 @@ class Branch:
         lbg, ubg = self._row_bounds(zero, equal)
         give_interior(c, zero, lbx, ubx, lbg, ubg)
         fix_single(c, w, lbx, ubx, lbg, ubg)
+        w, start = np.clip(w, lbx, ubx), self._start(duals)
+        if start is not None and box is None and self._newton.applies:
+            found = self._newton.solve(w, lbx, ubx, lbg, ubg, start)
+            if found is not None:
+                return found
         box = None if box is None else tuple(bound.copy() for bound in box)
         joined = self._differences.join(w, lbx, ubx, box)
         w = np.clip(w, lbx, ubx)
@@ -147,8 +168,8 @@ class Branch:
         if box is not None:
             free = lbx < ubx
             lbx, ubx = np.where(free, np.maximum(lbx, box[0]), lbx), np.where(free, np.minimum(ubx, box[1]), ubx)
-        nlp = self._far if far else self._nlp
-        result = nlp.solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, self._start(duals), **limits)
+        near, afar = self._solvers
+        result = (afar if far else near).solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, start, **limits)
         return replace(result, w=self._differences.parted(result.w, joined))
 
     def on_sides(self, w, zero):
@@ -186,7 +207,7 @@ class Branch:
         """Multipliers of a relaxation for the rows that a branch shares with it, zero for the others."""
         if duals is None:
             return None
-        rows, shared = len(self._c.lbg) + len(self._sides.chosen), np.zeros(self._pattern.shape[0])
+        rows, shared = len(self._c.lbg) + len(self._sides.chosen), np.zeros(len(self._c.lbg) + len(self._rows))
         shared[:rows] = duals.lam_g[:rows]
         return duals.with_multipliers(duals.lam_x[: len(self._c.x0)], shared)
 
