@@ -10,12 +10,12 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
-from pyomo_fesd.mpcc.compile.casadi_matrices import between, entries
+from pyomo_fesd.mpcc.compile.casadi_matrices import between, csr
 from pyomo_fesd.mpcc.compile.derivatives import ModelDerivatives
 from pyomo_fesd.mpcc.compile.last_points import LastPoints
 from pyomo_fesd.mpcc.compile.numeric_function import NumericFunction
+from pyomo_fesd.mpcc.compile.sparse_entries import with_entries
 from pyomo_fesd.mpcc.compile.stacked_jacobian import StackedJacobian
 
 
@@ -103,18 +103,19 @@ class MpccFunctions:
 
     @cached_property
     def _curvature(self):
-        """Function of the nonzeros of the upper triangle of the Lagrangian's Hessian, and their rows and columns."""
+        """Function of the nonzeros of the Lagrangian's Hessian in its upper triangle, their order in all of it, and its pattern."""
         m, q = len(self.lbg), self.pairs
         factors = self.kind.sym('factors', m + 2 * q)
-        of_g, of_sides = between(factors, 0, m), between(factors, m, m + 2 * q)
         if self.short:
             rows = ca.vertcat(self.g, self.G, self.H)
             upper = ca.triu(ca.hessian(self.f + (ca.dot(factors, rows) if m + q else 0), self.x)[0])
         else:
-            of_z = ca.vertcat(of_sides, self.kind(self.inner - 2 * q, 1))
-            upper = self.derivatives.hessian(self.x, self.p, ca.vertcat(self.kind(1), self.kind(1, 1)), of_g, of_z)
+            of_z = ca.vertcat(between(factors, m, m + 2 * q), self.kind(self.inner - 2 * q, 1))
+            upper = self.derivatives.hessian(self.x, self.p, ca.vertcat(self.kind(1), self.kind(1, 1)), between(factors, 0, m), of_z)
         function = ca.Function('curvature', [self.x, self.p, factors], [ca.densify(upper.nz[:])])
-        return NumericFunction(function), *entries(upper)
+        order = ca.DM(upper.sparsity(), list(range(1, upper.nnz() + 1)))
+        pattern = csr(ca.tril2symm(order.T))
+        return NumericFunction(function), pattern.data.astype(int) - 1, pattern
 
     @property
     def has_penalty(self) -> bool:
@@ -218,13 +219,10 @@ class MpccFunctions:
         """The Jacobian of g, G, H and the decisions' equations, one upon another (scipy csr), at ``w``."""
         return self._differentiated(w, self.parameters)[0]
 
-    def hessian(self, w, of_g, of_sides):
-        """The Hessian (scipy csr) of f + of_g g + of_sides (G, H) at ``w``."""
-        function, row, column = self._curvature
-        (numbers,) = function(w, self.parameters, np.concatenate([of_g, of_sides]))
-        off = row != column
-        places = np.concatenate([row, column[off]]), np.concatenate([column, row[off]])
-        return sparse.csr_matrix((np.concatenate([numbers, numbers[off]]), places), shape=(len(w), len(w)))
+    def hessian(self, w, factors):
+        """The Hessian (scipy csr) of f plus g, G and H times their ``factors`` at ``w``."""
+        function, order, pattern = self._curvature
+        return with_entries(pattern, function(w, self.parameters, factors)[0][order])
 
     def _gradients(self, w, parameters):
         function, pattern, _ = self._jacobian

@@ -15,6 +15,7 @@ Leaves: its solution.
 Does not apply: with decisions or penalties, and where it leaves the start or does not converge; ``solve`` then returns None.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +25,8 @@ from scipy.sparse.linalg import splu
 from pyomo_fesd.mpcc.compile import major_index
 from pyomo_fesd.mpcc.nlp import NEWTON, NlpResult
 
-#: Steps before an NLP solver takes over, and how far each may lead, relative to the sizes of the variables.
-STEPS, FARTHEST = 6, 0.3
+#: How far a step may lead, relative to the sizes of the variables, and the part of the residual that it may leave.
+FARTHEST, LEFT = 0.3, 0.1
 #: The shift d.
 SHIFT = 1e-8
 
@@ -74,7 +75,7 @@ class Newton:
     """
 
     def __init__(self, c, sides, tolerances):
-        self._c, self._sides, self._tolerances = c, sides, tolerances
+        self._c, self._tolerances = c, tolerances
         self._rows = np.concatenate([np.arange(len(c.lbg)), len(c.lbg) + sides])
 
     @property
@@ -84,62 +85,69 @@ class Newton:
 
     def solve(self, w, lbx, ubx, lbg, ubg, duals) -> NlpResult | None:
         """The solution near ``w`` with the multipliers ``duals``, or None."""
-        of_x, of_rows, y, z = _Limits(lbx, ubx), _Limits(lbg, ubg), duals.lam_g, duals.lam_x
-        for count in range(1, STEPS + 1):
+        of_x, of_rows = _Limits(lbx, ubx), _Limits(self._of_all(lbg, -np.inf), self._of_all(ubg, np.inf))
+        y, z, left, count = self._of_all(duals.lam_g, 0.0), duals.lam_x, np.inf, 0
+        while True:
             step, y = self._step(w, of_x, of_rows, y, z)
             if not np.abs(step / np.maximum(1.0, np.abs(w))).max(initial=0.0) <= FARTHEST:
                 return None
-            w = w + step
+            w, count = w + step, count + 1
             gradient, J, rows = self._linearised(w)
             reduced = gradient + J.T @ y
-            held, _ = of_x.active(w, -reduced)
-            z = np.where(held, -reduced, 0.0)
+            z = np.where(of_x.active(w, -reduced)[0], -reduced, 0.0)
             optimality = max(np.abs(reduced + z).max(initial=0.0), of_x.slackness(w, z), of_rows.slackness(rows, y))
             violation = max(of_x.violation(w), of_rows.violation(rows))
             if violation <= self._tolerances.violation and optimality <= self._tolerances.optimality:
                 w = np.clip(w, lbx, ubx)
-                return NlpResult(w, self._c.evaluate(w).f, NEWTON, count, y, z)
-        return None
+                return NlpResult(w, self._c.evaluate(w).f, NEWTON, count, y[self._rows], z)
+            if not max(optimality, violation) <= LEFT * left:
+                return None
+            left = max(optimality, violation)
+
+    def _of_all(self, numbers, other):
+        """Numbers of the branch's rows as those of g, G and H, with ``other`` for sides without a row."""
+        found = np.full(len(self._c.lbg) + 2 * self._c.pairs, other)
+        found[self._rows] = numbers
+        return found
 
     def _linearised(self, w):
-        """Gradient of f, Jacobian and values of the rows."""
+        """Gradient of f, Jacobian and values of g, G and H."""
         at = self._c.evaluate(w)
-        rows = np.concatenate([at.g, np.concatenate([at.G, at.H])[self._sides]])
-        return self._c.gradients(w)[0], self._c.stacked_jacobian(w)[self._rows], rows
+        return self._c.gradients(w)[0], self._c.stacked_jacobian(w), np.concatenate([at.g, at.G, at.H])
 
     def _step(self, w, of_x, of_rows, y, z):
         """A step and the multipliers of the rows at its end; numbers that are not finite where there is none."""
-        gradient, J, rows = self._linearised(w)
+        (gradient, J, rows), H = self._linearised(w), self._c.hessian(w, y)
         held, step = of_x.active(w, z)
         active, distance = of_rows.active(rows, y)
-        H, A, free = self._hessian(w, y), J[np.flatnonzero(active)], np.flatnonzero(~held)
-        residual = distance[active] - A @ step
-        right = np.concatenate([-(gradient + H @ step)[free], residual - SHIFT * y[active]])
-        new = _solved(_shifted(H[free][:, free], A[:, free]), right)
-        step[free], y = new[: len(free)], np.zeros(len(y))
-        y[active] = new[len(free) :]
+        free = ~held
+        right = np.concatenate([-(gradient + H @ step)[free], (distance - J @ step - SHIFT * y)[active]])
+        new = _solved(_matrix(H, J, free, active), right)
+        step[free], y = new[: np.count_nonzero(free)], np.zeros(len(y))
+        y[active] = new[np.count_nonzero(free) :]
         return step, y
 
-    def _hessian(self, w, y):
-        """The Hessian of the Lagrangian (csr)."""
-        of_sides, m = np.zeros(2 * self._c.pairs), len(self._c.lbg)
-        of_sides[self._sides] = y[m:]
-        return self._c.hessian(w, y[:m], of_sides)
+
+def _matrix(H, J, free, active):
+    """The matrix of a step, of the ``free`` variables and the ``active`` rows."""
+    n, m = np.count_nonzero(free), np.count_nonzero(active)
+    of_x, of_rows, own = _positions(free, 0), _positions(active, n), np.arange(n + m)
+    H_row, J_row, H_column, J_column = of_x[major_index(H)], of_rows[major_index(J)], of_x[H.indices], of_x[J.indices]
+    rows = np.concatenate([H_row, J_row, J_column, own])
+    columns = np.concatenate([H_column, J_column, J_row, own])
+    entries = np.concatenate([H.data, J.data, J.data, np.repeat([SHIFT, -SHIFT], [n, m])])
+    inside = (rows >= 0) & (columns >= 0)
+    return sparse.csc_matrix((entries[inside], (rows[inside], columns[inside])), shape=(n + m, n + m))
 
 
-def _shifted(H, A):
-    """The matrix of a step."""
-    n, m = H.shape[0], A.shape[0]
-    shift, own, of_rows = np.repeat([SHIFT, -SHIFT], [n, m]), np.arange(n + m), n + major_index(A)
-    rows = np.concatenate([own, major_index(H), of_rows, A.indices])
-    columns = np.concatenate([own, H.indices, A.indices, of_rows])
-    return sparse.csc_matrix((np.concatenate([shift, H.data, A.data, A.data]), (rows, columns)), shape=(n + m, n + m))
+def _positions(chosen, first):
+    """Positions of the chosen ones, from ``first`` on; -1 for the others."""
+    return np.where(chosen, np.cumsum(chosen) - 1 + first, -1)
 
 
 def _solved(matrix, right):
-    if not (matrix.shape[0] and np.isfinite(matrix.data).all()):
-        return np.full(len(right), np.nan)
-    try:
-        return splu(matrix, permc_spec='MMD_AT_PLUS_A').solve(right)
-    except RuntimeError:  # singular
-        return np.full(len(right), np.nan)
+    """The solution of linear equations; numbers that are not finite where the matrix is singular or not finite."""
+    if np.isfinite(matrix.data).all():
+        with suppress(RuntimeError):
+            return splu(matrix, permc_spec='MMD_AT_PLUS_A').solve(right)
+    return np.full(len(right), np.nan)
