@@ -83,7 +83,7 @@ class Branch:
         # few branches have a row without free variables
         return ca.Function('rows', [self._nlp.x, self._nlp.p], [self._nlp.g])
 
-    def solve(self, w, zero, equal=None, weight=0.0, settled=ROW_TOLERANCE, far=False, box=None, **more):
+    def solve(self, w, zero, equal=None, weight=0.0, settled=ROW_TOLERANCE, far=False, box=None, nearby=False, **more):
         """Solve the branch ``zero`` from ``w``.
 
         Parameters
@@ -100,14 +100,18 @@ class Branch:
             whether ``w`` may be far from the solution
         box : (array, array), optional
             a trust region: bounds of w besides its own
+        nearby : bool
+            whether only Newton's method may solve it, from the end ``duals`` of a relaxation
         more : ``max_iter`` and ``steepest`` of ``NlpSolver.solve``; ``duals``, the result of a relaxation or branch with the
             multipliers to start from
 
         Returns
         -------
-        NlpResult, or None if the assignment contradicts the bounds
+        NlpResult, or None if the assignment contradicts the bounds, or if it is not ``nearby``
         """
-        options = equal, weight, settled, far, box
+        if nearby and not self._newton.applies:
+            return None
+        options = equal, weight, settled, far, box, nearby
         result = self._solve(w, zero, *options, **more)
         if not self._c.fillings or (result is not None and result.solved):
             return result
@@ -118,7 +122,7 @@ class Branch:
 
         Where that fails, a solution with open fillings shows that the branch may have one with other sides.
         """
-        pairs, (equal, *_, box) = np.concatenate([f.pairs for f in self._c.fillings]), options
+        pairs, (equal, *_, box, _) = np.concatenate([f.pairs for f in self._c.fillings]), options
         if np.any(zero[pairs] == FREE):
             return result
         again = self._solve(self._with_decisions(w, equal, box), zero, *options, **more)
@@ -144,7 +148,7 @@ class Branch:
         new[extents] += np.linalg.lstsq(A, np.concatenate([(c.lbg - at.g)[own], -c.decided(w)[equal]]), rcond=None)[0]
         return np.clip(new, c.lbx, c.ubx)
 
-    def _solve(self, w, zero, equal, weight, settled, far, box, duals=None, **limits):
+    def _solve(self, w, zero, equal, weight, settled, far, box, nearby, duals=None, **limits):
         c = self._c
         zero, w = settle(c, self._sides, w, zero), with_shares(c.fillings, w)
         bounds = self._bounds(zero)
@@ -157,7 +161,7 @@ class Branch:
         w, start = np.clip(w, lbx, ubx), self._start(duals)
         if start is not None and box is None and self._newton.applies:
             found = self._newton.solve(w, lbx, ubx, lbg, ubg, start)
-            if found is not None:
+            if found is not None or nearby:
                 return found
         box = None if box is None else tuple(bound.copy() for bound in box)
         joined = self._differences.join(w, lbx, ubx, box)
