@@ -25,8 +25,8 @@ from scipy.sparse.linalg import splu
 from pyomo_fesd.mpcc.compile import major_index
 from pyomo_fesd.mpcc.nlp import NEWTON, NlpResult
 
-#: How far a step may lead, relative to the sizes of the variables, and the part of the residual that it may leave.
-FARTHEST, LEFT = 0.3, 0.1
+#: Steps before an NLP solver takes over, and how far each may lead, relative to the sizes of the variables.
+STEPS, FARTHEST = 8, 0.3
 #: The shift d.
 SHIFT = 1e-8
 
@@ -86,12 +86,12 @@ class Newton:
     def solve(self, w, lbx, ubx, lbg, ubg, duals) -> NlpResult | None:
         """The solution near ``w`` with the multipliers ``duals``, or None."""
         of_x, of_rows = _Limits(lbx, ubx), _Limits(self._of_all(lbg, -np.inf), self._of_all(ubg, np.inf))
-        y, z, left, count = self._of_all(duals.lam_g, 0.0), duals.lam_x, np.inf, 0
-        while True:
+        y, z, left = self._of_all(duals.lam_g, 0.0), duals.lam_x, np.inf
+        for count in range(1, STEPS + 1):
             step, y = self._step(w, of_x, of_rows, y, z)
             if not np.abs(step / np.maximum(1.0, np.abs(w))).max(initial=0.0) <= FARTHEST:
                 return None
-            w, count = w + step, count + 1
+            w = w + step
             gradient, J, rows = self._linearised(w)
             reduced = gradient + J.T @ y
             z = np.where(of_x.active(w, -reduced)[0], -reduced, 0.0)
@@ -100,9 +100,10 @@ class Newton:
             if violation <= self._tolerances.violation and optimality <= self._tolerances.optimality:
                 w = np.clip(w, lbx, ubx)
                 return NlpResult(w, self._c.evaluate(w).f, NEWTON, count, y[self._rows], z)
-            if not max(optimality, violation) <= LEFT * left:
+            if not max(optimality, violation) < left:
                 return None
             left = max(optimality, violation)
+        return None
 
     def _of_all(self, numbers, other):
         """Numbers of the branch's rows as those of g, G and H, with ``other`` for sides without a row."""
