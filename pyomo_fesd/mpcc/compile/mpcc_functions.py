@@ -104,18 +104,26 @@ class MpccFunctions:
     @cached_property
     def _curvature(self):
         """Function of the nonzeros of the Lagrangian's Hessian in its upper triangle, their order in all of it, and its pattern."""
-        m, q = len(self.lbg), self.pairs
-        factors = self.kind.sym('factors', m + 2 * q)
+        m, factors = len(self.lbg), self.kind.sym('factors', 1 + len(self.lbg) + self.inner)
+        weight, of_rows = factors[0], between(factors, 1, factors.numel())
         if self.short:
-            rows = ca.vertcat(self.g, self.G, self.H)
-            upper = ca.triu(ca.hessian(self.f + (ca.dot(factors, rows) if m + q else 0), self.x)[0])
+            rows = ca.vertcat(self.g, self.G, self.H, self.equal)
+            cost = self.f + weight * self.penalty
+            upper = ca.triu(ca.hessian(cost + ca.dot(of_rows, rows) if rows.numel() else cost, self.x)[0])
         else:
-            of_z = ca.vertcat(between(factors, m, m + 2 * q), self.kind(self.inner - 2 * q, 1))
-            upper = self.derivatives.hessian(self.x, self.p, ca.vertcat(self.kind(1), self.kind(1, 1)), between(factors, 0, m), of_z)
+            of_g, of_z = between(of_rows, 0, m), between(of_rows, m, m + self.inner)
+            upper = self.derivatives.hessian(self.x, self.p, ca.vertcat(self.kind(1), weight), of_g, of_z)
         function = ca.Function('curvature', [self.x, self.p, factors], [ca.densify(upper.nz[:])])
         order = ca.DM(upper.sparsity(), list(range(1, upper.nnz() + 1)))
         pattern = csr(ca.tril2symm(order.T))
         return NumericFunction(function), pattern.data.astype(int) - 1, pattern
+
+    @cached_property
+    def only_in_rows(self) -> np.ndarray:
+        """Mask over the variables that are in neither objective nor penalty, and linear in all rows and sides."""
+        used = np.diff(self._curvature[2].indptr)
+        used[ca.jacobian_sparsity(ca.vertcat(self.f, self.penalty), self.x).get_col()] += 1
+        return used == 0
 
     @property
     def has_penalty(self) -> bool:
@@ -220,7 +228,7 @@ class MpccFunctions:
         return self._differentiated(w, self.parameters)[0]
 
     def hessian(self, w, factors):
-        """The Hessian (scipy csr) of f plus g, G and H times their ``factors`` at ``w``."""
+        """The Hessian (scipy csr) at ``w`` of f plus the penalty, g, G, H and the decisions' equations times ``factors``."""
         function, order, pattern = self._curvature
         return with_entries(pattern, function(w, self.parameters, factors)[0][order])
 

@@ -76,7 +76,7 @@ class Branch:
     @cached_property
     def _differences(self):
         m = len(self._c.lbg)
-        return Differences(self._c, self._nlp, np.array([*range(m), *(m + i for i in self._rows)], dtype=int))
+        return Differences(self._c, np.array([*range(m), *(m + i for i in self._rows)], dtype=int))
 
     @cached_property
     def _values(self):
@@ -158,14 +158,15 @@ class Branch:
         lbg, ubg = self._row_bounds(zero, equal)
         give_interior(c, zero, lbx, ubx, lbg, ubg)
         fix_single(c, w, lbx, ubx, lbg, ubg)
+        box = None if box is None else tuple(bound.copy() for bound in box)
+        joined = self._differences.join(w, lbx, ubx, box)
         w, start = np.clip(w, lbx, ubx), self._start(duals)
         if start is not None and box is None and self._newton.applies:
             found = self._newton.solve(w, lbx, ubx, lbg, ubg, start)
-            if found is not None or nearby:
-                return found
-        box = None if box is None else tuple(bound.copy() for bound in box)
-        joined = self._differences.join(w, lbx, ubx, box)
-        w = np.clip(w, lbx, ubx)
+            if found is not None:
+                return replace(found, w=self._differences.parted(found.w, joined))
+        if nearby:
+            return None
         if not self._drop_settled_rows(w, lbx == ubx, lbg, ubg, settled):
             return None
         self._widen_surplus_equations(lbx == ubx, lbg, ubg)

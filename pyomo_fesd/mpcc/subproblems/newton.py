@@ -118,7 +118,7 @@ class Newton:
 
     def _step(self, w, of_x, of_rows, y, z):
         """A step and the multipliers of the rows at its end; numbers that are not finite where there is none."""
-        (gradient, J, rows), H = self._linearised(w), self._c.hessian(w, y)
+        (gradient, J, rows), H = self._linearised(w), self._c.hessian(w, np.append(0.0, y))
         held, step = of_x.active(w, z)
         active, distance = of_rows.active(rows, y)
         free = ~held
