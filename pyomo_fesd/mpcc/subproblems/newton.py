@@ -150,5 +150,5 @@ def _solved(matrix, right):
     """The solution of linear equations; numbers that are not finite where the matrix is singular or not finite."""
     if np.isfinite(matrix.data).all():
         with suppress(RuntimeError):
-            return splu(matrix, permc_spec='MMD_AT_PLUS_A').solve(right)
+            return splu(matrix).solve(right)
     return np.full(len(right), np.nan)
