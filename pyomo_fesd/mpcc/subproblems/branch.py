@@ -63,8 +63,8 @@ class Branch:
         return composed(self._c, Outer(z, ca.SX(0, 1), weight, ca.SX(0), take(z, self._rows), weight))
 
     @cached_property
-    def _solvers(self):
-        """Those for starts near to the solution and far from it."""
+    def solvers(self):
+        """The NLP solvers for starts near to the solution and far from it."""
         nlp = self._nlp
         exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': self._optimality}
         return [self._make('branch', nlp.x, nlp.p, nlp.f, nlp.g, given, nlp.derivatives) for given in (NEAR | exact, exact)]
@@ -173,7 +173,7 @@ class Branch:
         if box is not None:
             free = lbx < ubx
             lbx, ubx = np.where(free, np.maximum(lbx, box[0]), lbx), np.where(free, np.minimum(ubx, box[1]), ubx)
-        near, afar = self._solvers
+        near, afar = self.solvers
         result = (afar if far else near).solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, start, **limits)
         return replace(result, w=self._differences.parted(result.w, joined))
 
