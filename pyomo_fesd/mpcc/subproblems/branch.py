@@ -161,7 +161,7 @@ class Branch:
         box = None if box is None else tuple(bound.copy() for bound in box)
         joined = self._differences.join(w, lbx, ubx, box)
         w, start = np.clip(w, lbx, ubx), self._start(duals)
-        if start is not None and box is None and self._newton.applies:
+        if start is not None and start.solved and box is None and self._newton.applies:
             found = self._newton.solve(w, lbx, ubx, lbg, ubg, start)
             if found is not None:
                 return replace(found, w=self._differences.parted(found.w, joined))

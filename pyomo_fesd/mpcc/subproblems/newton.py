@@ -26,7 +26,7 @@ from pyomo_fesd.mpcc.compile import major_index
 from pyomo_fesd.mpcc.nlp import NEWTON, NlpResult
 
 #: Steps before an NLP solver takes over, and how far each may lead, relative to the sizes of the variables.
-STEPS, FARTHEST = 8, 0.3
+STEPS, FARTHEST = 8, 0.1
 #: The shift d.
 SHIFT = 1e-8
 

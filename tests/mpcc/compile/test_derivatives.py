@@ -148,7 +148,9 @@ def test_the_branch_nlp(c):
 @pytest.mark.parametrize('form', ['elastic', 'l1', 'scholtes', 'branch'])
 def test_short_problems_get_the_same_nlp(c, form, monkeypatch):
     def build(make):
-        return Branch(c, sort_sides(c), make).solvers if form == 'branch' else Relaxation(c, sort_sides(c), RELAXATIONS[form][1], make)
+        if form == 'branch':
+            return Branch(c, sort_sides(c), make).solvers
+        return Relaxation(c, sort_sides(c), RELAXATIONS[form][1], make)
 
     def handed():
         x, p, f, g, d = made(build)
