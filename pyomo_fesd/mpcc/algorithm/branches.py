@@ -91,6 +91,8 @@ class Branches:
 
         This is no attempt at the branch: without a certified solution the path goes on as if nothing had been tried.
         """
+        if self.tried(sets.zero):
+            return
         point = self.solutions.certified(relaxed.w, sets.zero, duals=relaxed, nearby=True)
         if point is not None and point.certificate.certified:
             self.improve_from(point, False)

@@ -162,10 +162,11 @@ class Homotopy:
         exhausted = product <= EXHAUSTED and sets.same_sides(position.sets)
         explores = self._worth_a_branch(position, sets, product)
         named = self._branches.explore(relaxed, sets, self.finished or exhausted) if explores else None
-        if self._branches is not None and not explores and product <= NEARBY:
+        nearby = self._branches is not None and not explores and product <= NEARBY
+        if nearby:
             self._branches.explore_nearby(relaxed, sets)
         self._after(self.run)
-        if self._branches is not None and self._settled(position.named, named):
+        if (explores or nearby) and self._settled(position.named, named):
             return None
         if self.finished or (exhausted and explores and self._branches.tried(sets.zero)):
             return self._other_path(position, relaxed)
