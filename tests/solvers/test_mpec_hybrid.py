@@ -18,7 +18,7 @@ from pyomo.gdp import Disjunction
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd import FesdError
-from pyomo_fesd.mpcc.nlp import casadi_solvers
+from pyomo_fesd.mpcc.nlp import NEWTON, casadi_solvers
 
 
 def toy():
@@ -116,7 +116,7 @@ def test_unknown_option_is_named():
 
 def test_options_reach_ipopt():
     results = SolverFactoryV2('mpec_hybrid').solve(toy(), nlp_options={'max_iter': 1}, raise_exception_on_nonoptimal_result=False)
-    assert max(step.iterations for step in results.extra_info.steps) <= 1
+    assert max(step.iterations for step in results.extra_info.steps if step.status != NEWTON) <= 1
 
 
 def test_tee_prints_a_table_one_line_a_step(capsys):

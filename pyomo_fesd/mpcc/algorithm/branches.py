@@ -86,6 +86,17 @@ class Branches:
         self.improve_from(point, final or self._global_lpec)
         return self._solved.get(sets.zero.tobytes())
 
+    def explore_nearby(self, relaxed, sets):
+        """Solve the branch that active sets name where Newton's method does, and keep its solution if it is certified.
+
+        This is no attempt at the branch: without a certified solution the path goes on as if nothing had been tried.
+        """
+        if self.tried(sets.zero):
+            return
+        point = self.solutions.certified(relaxed.w, sets.zero, duals=relaxed, nearby=True)
+        if point is not None and point.certificate.certified:
+            self.improve_from(point, False)
+
     def explore_from(self, w, final):
         """Solve the branch that the values ``w`` name."""
         self.improve_from(self._point(w, self._subsolves.sets(w, self._tolerances.biactive).zero, None, final), final)
@@ -303,8 +314,7 @@ class Branches:
         step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal, limits=limits, **shown)
         if not step.solved or step.descent <= clear:
             return None
-        better = self._point(point.w + step.d, step.zero, None, False)
-        return better if is_below(better, enough) else None
+        return self._point(point.w + step.d, step.zero, None, False, enough=enough)
 
     def _point(self, w, zero, duals, final, **more):
         """The solution of branch ``zero``, certified; None if it has none.

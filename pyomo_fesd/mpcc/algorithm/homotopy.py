@@ -27,6 +27,8 @@ WITH_MULTIPLIERS = 1e-2
 LATE, UNDECIDED = 1e-3, 0.5
 #: So is one with products below this: the elastic form ends near a solution already at its first eps.
 NEARLY = 1e-6
+#: With products below this Newton's method may find the branch's solution at once, which costs next to nothing.
+NEARBY = 1e-2
 #: With products below this and the same active sides as before, a smaller eps changes nothing.
 EXHAUSTED = 1e-8
 #: Products of eps_factor carry round-off.
@@ -160,8 +162,11 @@ class Homotopy:
         exhausted = product <= EXHAUSTED and sets.same_sides(position.sets)
         explores = self._worth_a_branch(position, sets, product)
         named = self._branches.explore(relaxed, sets, self.finished or exhausted) if explores else None
+        nearby = self._branches is not None and not explores and product <= NEARBY
+        if nearby:
+            self._branches.explore_nearby(relaxed, sets)
         self._after(self.run)
-        if explores and self._settled(position.named, named):
+        if (explores or nearby) and self._settled(position.named, named):
             return None
         if self.finished or (exhausted and explores and self._branches.tried(sets.zero)):
             return self._other_path(position, relaxed)

@@ -11,9 +11,11 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from pyomo_fesd.mpcc.compile.casadi_matrices import between, csr
 from pyomo_fesd.mpcc.compile.derivatives import ModelDerivatives
 from pyomo_fesd.mpcc.compile.last_points import LastPoints
 from pyomo_fesd.mpcc.compile.numeric_function import NumericFunction
+from pyomo_fesd.mpcc.compile.sparse_entries import with_entries
 from pyomo_fesd.mpcc.compile.stacked_jacobian import StackedJacobian
 
 
@@ -98,6 +100,36 @@ class MpccFunctions:
         numbers = ca.vertcat(self.kind(0, 1), *(ca.vec(J.nz[:]) for J in blocks))
         function = ca.Function('jacobian', list(at), [ca.densify(slopes), ca.densify(numbers)])
         return NumericFunction(function), pattern, slopes.nnz()
+
+    @cached_property
+    def _curvature(self):
+        """Function of the nonzeros of the Lagrangian's Hessian in its upper triangle, their order in all of it, and its pattern."""
+        m, factors = len(self.lbg), self.kind.sym('factors', 1 + len(self.lbg) + self.inner)
+        weight, of_rows = factors[0], between(factors, 1, factors.numel())
+        if self.short:
+            rows = ca.vertcat(self.g, self.G, self.H, self.equal)
+            cost = self.f + weight * self.penalty
+            upper = ca.triu(ca.hessian(cost + ca.dot(of_rows, rows) if rows.numel() else cost, self.x)[0])
+        else:
+            of_g, of_z = between(of_rows, 0, m), between(of_rows, m, m + self.inner)
+            upper = self.derivatives.hessian(self.x, self.p, ca.vertcat(self.kind(1), weight), of_g, of_z)
+        function = ca.Function('curvature', [self.x, self.p, factors], [ca.densify(upper.nz[:])])
+        order = ca.DM(upper.sparsity(), list(range(1, upper.nnz() + 1)))
+        pattern = csr(ca.tril2symm(order.T))
+        return NumericFunction(function), pattern.data.astype(int) - 1, pattern
+
+    @cached_property
+    def only_in_rows(self) -> np.ndarray:
+        """Mask over the variables that are in neither objective nor penalty, and linear in all rows and sides."""
+        used = np.diff(self._curvature[2].indptr)
+        used[ca.jacobian_sparsity(ca.vertcat(self.f, self.penalty), self.x).get_col()] += 1
+        return used == 0
+
+    @property
+    def has_penalty(self) -> bool:
+        """Whether there are penalty terms."""
+        cost = self._functions.cost.functions
+        return bool(cost.linear[1].nnz or cost.constants[1] or any((k.rows == 1).any() for k in cost.classes))
 
     @property
     def short(self) -> bool:
@@ -194,6 +226,11 @@ class MpccFunctions:
     def stacked_jacobian(self, w):
         """The Jacobian of g, G, H and the decisions' equations, one upon another (scipy csr), at ``w``."""
         return self._differentiated(w, self.parameters)[0]
+
+    def hessian(self, w, factors):
+        """The Hessian (scipy csr) at ``w`` of f plus the penalty, g, G, H and the decisions' equations times ``factors``."""
+        function, order, pattern = self._curvature
+        return with_entries(pattern, function(w, self.parameters, factors)[0][order])
 
     def _gradients(self, w, parameters):
         function, pattern, _ = self._jacobian

@@ -34,10 +34,13 @@ IPOPT = {
 IPOPT_WARM = {'warm_start_init_point': 'yes'} | {
     f'warm_start_{name}': 1e-6 for name in ('bound_push', 'bound_frac', 'slack_bound_push', 'slack_bound_frac', 'mult_bound_push')
 }
-#: Status of a stationary, feasible point: Ipopt's, Uno's, and Pyomo's for an executable; the first one is to looser tolerances.
+#: Status of a stationary, feasible point: Ipopt's, our own, Uno's, and Pyomo's for an executable; the first one is to looser
+#: tolerances.
 ACCEPTABLE = 'Solved_To_Acceptable_Level'
+NEWTON = "Newton's method converged"
 SOLVED = (
     'Solve_Succeeded',
+    NEWTON,
     ACCEPTABLE,
     'Feasible_Point_Found',
     'Converged with feasible KKT point',

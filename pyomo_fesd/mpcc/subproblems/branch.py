@@ -20,6 +20,7 @@ from pyomo_fesd.mpcc.subproblems.active_set import FREE
 from pyomo_fesd.mpcc.subproblems.differences import Differences
 from pyomo_fesd.mpcc.subproblems.impact_sides import give_interior
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, infeasible
+from pyomo_fesd.mpcc.subproblems.newton import Newton, Tolerances
 from pyomo_fesd.mpcc.subproblems.side_constraints import settle, with_shares
 from pyomo_fesd.mpcc.subproblems.single_rows import fix_single
 
@@ -49,25 +50,40 @@ class Branch:
     """
 
     def __init__(self, c, sides, make):
-        self._c, self._sides = c, sides
-        weight, z = ca.SX.sym('weight'), ca.SX.sym('z', c.inner)
-        inner = [*sides.chosen, *range(2 * c.pairs, z.numel())]
-        rows = take(z, inner)
-        nlp = composed(c, Outer(z, ca.SX(0, 1), weight, ca.SX(0), rows, weight))
-        self._pattern = csr_pattern(nlp.derivatives.jacobian)
-        self._rows = [nlp.x, nlp.p], [nlp.g]
-        m = len(c.lbg)
-        self._differences = Differences(c, nlp, np.array([*range(m), *(m + i for i in inner)], dtype=int))
-        given = nlp.x, nlp.p, nlp.f, nlp.g
-        exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': max(OPTIMALITY * min(1.0, c.scale.f), LEAST)}
-        self._nlp, self._far = (make('branch', *given, budget, nlp.derivatives) for budget in (NEAR | exact, exact))
+        self._c, self._sides, self._make = c, sides, make
+        self._rows = [*sides.chosen, *range(2 * c.pairs, c.inner)]
+        self._optimality = max(OPTIMALITY * min(1.0, c.scale.f), LEAST)
+        self._newton = Newton(c, sides.chosen, Tolerances(FEASIBILITY, self._optimality))
+
+    # most branches near the end of a relaxation need no NLP solver
+
+    @cached_property
+    def _nlp(self):
+        weight, z = ca.SX.sym('weight'), ca.SX.sym('z', self._c.inner)
+        return composed(self._c, Outer(z, ca.SX(0, 1), weight, ca.SX(0), take(z, self._rows), weight))
+
+    @cached_property
+    def solvers(self):
+        """The NLP solvers for starts near to the solution and far from it."""
+        nlp = self._nlp
+        exact = {'constr_viol_tol': FEASIBILITY, 'compl_inf_tol': self._optimality}
+        return [self._make('branch', nlp.x, nlp.p, nlp.f, nlp.g, given, nlp.derivatives) for given in (NEAR | exact, exact)]
+
+    @cached_property
+    def _pattern(self):
+        return csr_pattern(self._nlp.derivatives.jacobian)
+
+    @cached_property
+    def _differences(self):
+        m = len(self._c.lbg)
+        return Differences(self._c, np.array([*range(m), *(m + i for i in self._rows)], dtype=int))
 
     @cached_property
     def _values(self):
         # few branches have a row without free variables
-        return ca.Function('rows', *self._rows)
+        return ca.Function('rows', [self._nlp.x, self._nlp.p], [self._nlp.g])
 
-    def solve(self, w, zero, equal=None, weight=0.0, settled=ROW_TOLERANCE, far=False, box=None, **more):
+    def solve(self, w, zero, equal=None, weight=0.0, settled=ROW_TOLERANCE, far=False, box=None, nearby=False, **more):
         """Solve the branch ``zero`` from ``w``.
 
         Parameters
@@ -84,14 +100,18 @@ class Branch:
             whether ``w`` may be far from the solution
         box : (array, array), optional
             a trust region: bounds of w besides its own
+        nearby : bool
+            whether only Newton's method may solve it, from the end ``duals`` of a relaxation
         more : ``max_iter``, ``steepest`` and ``stall`` of ``NlpSolver.solve``; ``duals``, the result of a relaxation or branch with
             the multipliers to start from
 
         Returns
         -------
-        NlpResult, or None if the assignment contradicts the bounds
+        NlpResult, or None if the assignment contradicts the bounds, or if it is not ``nearby``
         """
-        options = equal, weight, settled, far, box
+        if nearby and not self._newton.applies:
+            return None
+        options = equal, weight, settled, far, box, nearby
         result = self._solve(w, zero, *options, **more)
         if not self._c.fillings or (result is not None and result.solved):
             return result
@@ -102,7 +122,7 @@ class Branch:
 
         Where that fails, a solution with open fillings shows that the branch may have one with other sides.
         """
-        pairs, (equal, *_, box) = np.concatenate([f.pairs for f in self._c.fillings]), options
+        pairs, (equal, *_, box, _) = np.concatenate([f.pairs for f in self._c.fillings]), options
         if np.any(zero[pairs] == FREE):
             return result
         again = self._solve(self._with_decisions(w, equal, box), zero, *options, **more)
@@ -128,7 +148,7 @@ class Branch:
         new[extents] += np.linalg.lstsq(A, np.concatenate([(c.lbg - at.g)[own], -c.decided(w)[equal]]), rcond=None)[0]
         return np.clip(new, c.lbx, c.ubx)
 
-    def _solve(self, w, zero, equal, weight, settled, far, box, duals=None, **limits):
+    def _solve(self, w, zero, equal, weight, settled, far, box, nearby, duals=None, **limits):
         c = self._c
         zero, w = settle(c, self._sides, w, zero), with_shares(c.fillings, w)
         bounds = self._bounds(zero)
@@ -140,15 +160,21 @@ class Branch:
         fix_single(c, w, lbx, ubx, lbg, ubg)
         box = None if box is None else tuple(bound.copy() for bound in box)
         joined = self._differences.join(w, lbx, ubx, box)
-        w = np.clip(w, lbx, ubx)
+        w, start = np.clip(w, lbx, ubx), self._start(duals)
+        if start is not None and start.solved and box is None and self._newton.applies:
+            found = self._newton.solve(w, lbx, ubx, lbg, ubg, start)
+            if found is not None:
+                return replace(found, w=self._differences.parted(found.w, joined))
+        if nearby:
+            return None
         if not self._drop_settled_rows(w, lbx == ubx, lbg, ubg, settled):
             return None
         self._widen_surplus_equations(lbx == ubx, lbg, ubg)
         if box is not None:
             free = lbx < ubx
             lbx, ubx = np.where(free, np.maximum(lbx, box[0]), lbx), np.where(free, np.minimum(ubx, box[1]), ubx)
-        nlp = self._far if far else self._nlp
-        result = nlp.solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, self._start(duals), **limits)
+        near, afar = self.solvers
+        result = (afar if far else near).solve(w, [weight, *c.parameters], lbx, ubx, lbg, ubg, start, **limits)
         return replace(result, w=self._differences.parted(result.w, joined))
 
     def on_sides(self, w, zero):
@@ -186,7 +212,7 @@ class Branch:
         """Multipliers of a relaxation for the rows that a branch shares with it, zero for the others."""
         if duals is None:
             return None
-        rows, shared = len(self._c.lbg) + len(self._sides.chosen), np.zeros(self._pattern.shape[0])
+        rows, shared = len(self._c.lbg) + len(self._sides.chosen), np.zeros(len(self._c.lbg) + len(self._rows))
         shared[:rows] = duals.lam_g[:rows]
         return duals.with_multipliers(duals.lam_x[: len(self._c.x0)], shared)
 

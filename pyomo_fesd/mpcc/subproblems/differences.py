@@ -7,11 +7,10 @@ pairs whose side is p + n look decided, though p = n = 0 may satisfy them too.
 In a branch that has neither of them at a bound x_i is 0, and x_j takes the whole difference, with either sign.  At its solution
 each gets its part, and one of them is 0.
 
-Takes: the NLP of all branches, and bounds of variables.
+Takes: a compiled MPCC, and bounds of variables.
 Leaves: bounds, start and trust region with one variable for each difference; and the values of both.
 """
 
-import casadi as ca
 import numpy as np
 
 from pyomo_fesd.mpcc.compile import LastPoints
@@ -27,18 +26,13 @@ class Differences:
     Parameters
     ----------
     c : MpccFunctions
-    nlp : Nlp
     rows : int array
-        stacked numbers of its rows
+        stacked numbers of the rows of these NLPs
     """
 
-    def __init__(self, c, nlp, rows):
+    def __init__(self, c, rows):
         self._c, self._rows = c, rows
-        # without an entry in gradient and Hessian a variable is in no cost, and linear in all rows
-        in_hessian = nlp.derivatives.hessian.sparsity()
-        used = np.bincount(np.array([*in_hessian.row(), *in_hessian.get_col()], dtype=int), minlength=nlp.x.numel())
-        used[ca.jacobian_sparsity(nlp.f, nlp.x).get_col()] += 1
-        (self._among,) = np.nonzero((used == 0) & (c.lbx == 0.0) & (c.ubx == np.inf))
+        (self._among,) = np.nonzero(c.only_in_rows & (c.lbx == 0.0) & (c.ubx == np.inf))
         # slopes may contain parameters
         self._known = LastPoints(self._found)
 

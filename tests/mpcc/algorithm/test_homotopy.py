@@ -12,6 +12,7 @@ from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import homotopy_hints
 from pyomo_fesd.mpcc.algorithm.recovery import RECOVERIES
+from pyomo_fesd.mpcc.nlp import NEWTON
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS
 
 PROBLEMS = [small_mpccs.toy, small_mpccs.bard1, small_mpccs.ralph1, small_mpccs.badly_scaled, small_mpccs.mixed]
@@ -53,6 +54,20 @@ def test_where_the_elastic_form_is_complementary_at_once_eps_jumps_to_the_end():
     path = relaxations(run(m, mode='relaxation', relaxation='elastic'))
     assert path[-1].eps == 1e-9
     assert len(path) < 5 < len(relaxations(run(small_mpccs.toy(0.5, 0.2)[0], mode='relaxation', relaxation='scholtes')))
+
+
+def test_small_products_are_worth_a_branch_to_newtons_method_whatever_is_undecided():
+    """scholtes2 of MacMPEC: its pair is bi-active at the solution."""
+    m = pyo.ConcreteModel()
+    m.z = pyo.Var(range(3), initialize=1)
+    m.z[0].setlb(0)
+    m.row = pyo.Constraint(expr=m.z[2] >= 0)
+    m.pair = Complementarity(expr=complements(m.z[0] >= 0, m.z[1] - pyo.exp(m.z[0]) - pyo.exp(m.z[2]) >= 0))
+    m.cost = pyo.Objective(expr=(m.z[0] + 1) ** 2 + m.z[1] ** 2 + 10 * (m.z[2] + 1) ** 2)
+    results = run(m)
+    assert [step.status for step in results.extra_info.steps if step.kind == 'branch'] == [NEWTON]
+    assert len(relaxations(results)) == 1 and results.extra_info.stationarity == 'B'
+    assert results.incumbent_objective == pytest.approx(15)
 
 
 def test_a_complementary_relaxation_is_worth_a_branch_at_the_first_eps_also_with_a_bi_active_pair():

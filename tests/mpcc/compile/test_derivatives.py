@@ -141,14 +141,16 @@ def test_every_relaxation(c, form):
 
 
 def test_the_branch_nlp(c):
-    x, p, *rest = made(lambda make: Branch(c, sort_sides(c), make))
+    x, p, *rest = made(lambda make: Branch(c, sort_sides(c), make).solvers)
     agree(x, p, *rest, random_points(x.numel(), c.parameters))
 
 
 @pytest.mark.parametrize('form', ['elastic', 'l1', 'scholtes', 'branch'])
 def test_short_problems_get_the_same_nlp(c, form, monkeypatch):
     def build(make):
-        return Branch(c, sort_sides(c), make) if form == 'branch' else Relaxation(c, sort_sides(c), RELAXATIONS[form][1], make)
+        if form == 'branch':
+            return Branch(c, sort_sides(c), make).solvers
+        return Relaxation(c, sort_sides(c), RELAXATIONS[form][1], make)
 
     def handed():
         x, p, f, g, d = made(build)

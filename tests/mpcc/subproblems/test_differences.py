@@ -1,13 +1,11 @@
 """Differences of variables >= 0 get one variable each in a branch, and both have their parts at its solution."""
 
-import casadi
 import numpy as np
 import pyomo.environ as pyo
 import pytest
 from pyomo.common.timing import HierarchicalTimer
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.mpcc.compile import Outer, composed, take
 from pyomo_fesd.mpcc.compile.compile import compile_mpcc
 from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc
 from pyomo_fesd.mpcc.subproblems.differences import Differences
@@ -31,9 +29,7 @@ def compiled(m):
 
 
 def differences(c):
-    z = casadi.SX.sym('z', c.inner)
-    nlp = composed(c, Outer(z, casadi.SX(0, 1), casadi.SX.sym('weight'), casadi.SX(0), take(z, range(2 * c.pairs, c.inner)), 0.0))
-    return Differences(c, nlp, np.arange(len(c.lbg)))
+    return Differences(c, np.arange(len(c.lbg)))
 
 
 def joined(c, box=None, **bounds):
