@@ -98,6 +98,6 @@ def _maker(value, places) -> Callable | None:
         return None if kind is tuple else lambda copies: kind(value)
     makers = [make or (lambda copies, inner=inner: inner) for make, inner in zip(makers, inside)]
     if kind is dict:
-        keys = list(value)
-        return lambda copies: dict(zip(keys, [make(copies) for make in makers]))
+        entries = list(zip(value, makers))
+        return lambda copies: {key: make(copies) for key, make in entries}
     return lambda copies: kind([make(copies) for make in makers])
