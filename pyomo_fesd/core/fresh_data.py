@@ -64,25 +64,21 @@ class _Pattern:
     def copy(self) -> BlockData:
         """Return a copy, of no component yet."""
         copies = [object.__new__(cls) for cls, *_ in self._parts]
-        for part, (_, slots, own_slots, attributes, own) in zip(copies, self._parts):
-            for name, value in slots:
+        for part, (_, shared, own) in zip(copies, self._parts):
+            for name, value in shared:
                 _set(part, name, value)
-            for name, make in own_slots:
-                _set(part, name, make(copies))
-            state = part.__dict__
-            state.update(attributes)
             for name, make in own:
-                state[name] = make(copies)
+                _set(part, name, make(copies))
         return copies[0]
 
 
 def _attributes(part, places):
-    """The slots and the other attributes of a part: values that all copies share, functions that make those that each has alone."""
+    """The values of attributes that all copies of a part share, and functions that make those that each has alone."""
     slots = {name: getattr(part, name) for name in part.__auto_slots__.slots if places[id(part)] or name not in OF_COMPONENT}
-    for attributes in (slots, part.__dict__):
-        made = {name: _maker(value, places) for name, value in attributes.items()}
-        yield [(name, value) for name, value in attributes.items() if made[name] is None]
-        yield [(name, make) for name, make in made.items() if make is not None]
+    attributes = slots | part.__dict__
+    made = {name: _maker(value, places) for name, value in attributes.items()}
+    shared = [(name, value) for name, value in attributes.items() if made[name] is None]
+    return shared, [(name, make) for name, make in made.items() if make is not None]
 
 
 def _maker(value, places) -> Callable | None:
