@@ -1,8 +1,8 @@
-"""Make empty data of Disjuncts and Complementarities as Pyomo makes them, in a third of the time.
+"""Make empty data of Disjuncts and Complementarities as Pyomo makes them, in half of the time.
 
-Pyomo declares, checks and constructs both indicators of a Disjunct like components of the user, and checks each attribute of a
-block.  There is a Disjunct of each mode at every time, so that takes a tenth of the time of a transformation.  Here Pyomo makes
-such data once; all others are copies of their attributes, each with its own containers and its own indicators.
+Pyomo declares, checks and constructs both indicators of a Disjunct like components of the user, and looks for components among the
+attributes of a block.  There is a Disjunct of each mode at every time, so that takes a tenth of the time of a transformation.  Here
+Pyomo makes such data once; others get the same attributes, with containers and indicators of their own.
 
 Takes: a constructed Disjunct or Complementarity, and a stored index of its index set without data.
 Leaves: what the component's own ``_setitem_when_not_present`` leaves there.

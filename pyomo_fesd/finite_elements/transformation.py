@@ -75,7 +75,7 @@ PLACES = (Block, Disjunct)
 
 @dataclass
 class _Switching:
-    """All that switches over time: pairs, mixed conditions, sides of pairs (name -> {time: ...}), laws of modes, jumps, contacts."""
+    """All that switches: pairs, mixed conditions and sides of pairs (name -> {time: ...}), laws of modes, jumps and contacts."""
 
     pairs: dict
     mixed: dict
