@@ -7,8 +7,9 @@ the solver; no time in it).
 ``private_data`` keeps them on blocks, ``generated`` recognises generated blocks, ``keywords`` refuses values outside of their
 domains, ``renamed`` words of earlier versions, ``rollback`` undoes what was left half done, ``interruption`` lets Ctrl-C wait
 where something would be, ``withheld_messages`` keeps back the messages of one thread, ``turns`` lets threads wait for one another.
-``evaluation``, ``gradient``, ``gradients``, ``insertion``, ``interpolation``, ``positive_part``, ``step``, ``smallest``,
-``units_of_measure``, ``expression_key``, ``stamp``, ``structural_key``, ``node_search``, ``own_data`` and ``phase`` are tools.
+``evaluation``, ``fresh_data``, ``gradient``, ``gradients``, ``insertion``, ``interpolation``, ``positive_part``, ``step``,
+``smallest``, ``sums``, ``units_of_measure``, ``expression_key``, ``stamp``, ``structural_key``, ``node_search``, ``own_data`` and
+``phase`` are tools.
 This room imports from no other.
 """
 
@@ -27,6 +28,7 @@ from pyomo_fesd.core.evaluation import (
     variables_that_count,
 )
 from pyomo_fesd.core.expression_key import component_key, exchanged, expression_key
+from pyomo_fesd.core.fresh_data import make_data
 from pyomo_fesd.core.generated import GENERATED, is_generated, public_name, source_name
 from pyomo_fesd.core.gradient import gradient
 from pyomo_fesd.core.gradients import gradients

@@ -12,13 +12,19 @@ from collections.abc import Iterable
 
 from pyomo.core.base.component import ComponentData
 from pyomo.core.base.indexed_component import IndexedComponent
+from pyomo.mpec import Complementarity
 
+from pyomo_fesd.core.fresh_data import make_data
 from pyomo_fesd.core.time_index import stored_index
 
 
 def insert(component: IndexedComponent, index: tuple, content) -> ComponentData:
     """Add ``content`` at ``index`` and return its data."""
-    return component._setitem_when_not_present(stored_index(index), content)
+    if component.ctype is not Complementarity:
+        return component._setitem_when_not_present(stored_index(index), content)
+    data = make_data(component, stored_index(index))
+    data.set_value(content)
+    return data
 
 
 def add_copies(component: IndexedComponent, indices: Iterable) -> None:

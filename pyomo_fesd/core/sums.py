@@ -12,6 +12,8 @@ from pyomo.core.expr import LinearExpression, MonomialTermExpression
 
 def sum_of(terms: Sequence):
     """Return the sum of ``terms``, 0 without any."""
+    if len(terms) > 1 and all(x.__class__ is VarData for x in terms):
+        return LinearExpression(list(terms))
     return sum(terms[1:], terms[0]) if terms else 0
 
 

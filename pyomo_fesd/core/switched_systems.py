@@ -8,7 +8,7 @@ record when it is cloned, and loses it when it is deleted.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any
+from typing import Any, NamedTuple
 
 from pyomo.common.autoslots import AutoSlots
 from pyomo.common.collections import ComponentMap, ComponentSet
@@ -95,8 +95,7 @@ class Contact:
     sticking: Any = None
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """One step function at one time (eq. 5).
 
     Attributes
@@ -111,8 +110,7 @@ class Step:
     c: Any
 
 
-@dataclass(frozen=True)
-class Dependents:
+class Dependents(NamedTuple):
     """Generated variables of one time that follow from expressions, such as p, n and nu from a switching function.
 
     Attributes

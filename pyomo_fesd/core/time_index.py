@@ -47,7 +47,7 @@ def is_discretisation_equation(constraint) -> bool:
 
 def is_indexed_by(component, wrt) -> bool:
     """Whether ``wrt`` is one of the index sets of ``component`` itself."""
-    return component.is_indexed() and any(s is wrt for s in index_sets(component))
+    return component.is_indexed() and (component.index_set() is wrt or any(s is wrt for s in index_sets(component)))
 
 
 def time_position(component, wrt) -> int | None:

@@ -91,10 +91,11 @@ def _pairs(condition, element, form) -> Iterator[tuple]:
     """The pairs of eq. (11) for one time complementarity and element, with their point indices."""
     if not condition.points(element):
         return
-    G, H = condition.values(element, 0), condition.values(element, 1)
     if form == 'element':
-        yield (), (sum_of(G), sum_of(H))
-    elif form == 'point':
+        yield (), condition.sums(element)
+        return
+    G, H = condition.values(element, 0), condition.values(element, 1)
+    if form == 'point':
         yield from (((r,), (G_r, sum_of(H))) for r, G_r in enumerate(G, start=1))
     else:
         yield from (((r, s), (G_r, H_s)) for r, G_r in enumerate(G, start=1) for s, H_s in enumerate(H, start=1))

@@ -17,7 +17,7 @@ from math import prod
 from pyomo.core import Block, Constraint, Expression, quicksum
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.core import BranchConstraint, MovingGrid, Penalty, divided_by, homotopy_hints, insert, sum_of, unit_of
+from pyomo_fesd.core import BranchConstraint, MovingGrid, Penalty, divided_by, homotopy_hints, insert, unit_of
 from pyomo_fesd.finite_elements.contacts import impulse_activity
 from pyomo_fesd.finite_elements.state_jumps import no_jump
 
@@ -78,7 +78,7 @@ def _activities(condition, elements):
     units = None
     for element in elements:
         if condition.points(element):
-            sums = [sum_of(condition.values(element, side)) for side in (0, 1)]
+            sums = condition.sums(element)
             units = units or list(map(unit_of, sums))
             G, H = map(divided_by, sums, units)
             yield element.n, G / (G + H + TINY)

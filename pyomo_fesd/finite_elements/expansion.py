@@ -23,6 +23,7 @@ from pyomo.core import (
     Suffix,
     Var,
 )
+from pyomo.core.base.block import BlockData
 from pyomo.core.base.misc import apply_indexed_rule
 from pyomo.dae import ContinuousSet, DerivativeVar, Integral
 from pyomo.gdp import Disjunct, Disjunction
@@ -37,6 +38,7 @@ from pyomo_fesd.core import (
     is_generated,
     is_indexed_by,
     label_decimals,
+    make_data,
     own_components,
     paused_collection,
     withheld_messages,
@@ -194,8 +196,11 @@ def _make_missing(disjunct):
     """Make the missing data of a Disjunct by its rule."""
     for index in disjunct.index_set():
         if index not in disjunct._data:
-            # what ``disjunct[index]`` calls when it has searched the index set
-            disjunct._getitem_when_not_present(index)
+            # as ``disjunct[index]`` does when it has searched the index set
+            data = make_data(disjunct, index)
+            returned = disjunct._rule(data, index)
+            if isinstance(returned, BlockData) and returned is not data:
+                data.transfer_attributes_from(returned)
 
 
 def _hybrid_over_time(block, wrt):

@@ -9,6 +9,7 @@ import logging
 from collections import Counter, defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from pyomo.core import Block
 from pyomo.core.expr.visitor import identify_variables
@@ -25,6 +26,7 @@ from pyomo_fesd.core import (
     public_name,
     read_complementarity,
     strip_time,
+    sum_of,
 )
 from pyomo_fesd.finite_elements.algebraic_graph import rule_of
 from pyomo_fesd.finite_elements.continuity import Continuity, inner_label
@@ -91,15 +93,29 @@ class TimeComplementarity:
             values.append(self.departures[element.n])
         return values
 
+    def sums(self, element: Element) -> tuple:
+        """Return the sums G_n and H_n of the two sides over ``element`` (theory, eq. 11a); pairs and activities share them."""
+        if element.n not in self._sums:
+            self._sums[element.n] = sum_of(self.values(element, 0)), sum_of(self.values(element, 1))
+        return self._sums[element.n]
 
-def conditions_over_time(block: Block, times: TimeIndex) -> tuple[dict, dict]:
-    """Return the active conditions over time on ``block``: pairs, and mixed conditions, each as name -> {time: data}."""
-    pairs, mixed = {}, {}
+    @cached_property
+    def _sums(self):
+        return {}
+
+
+def conditions_over_time(block: Block, times: TimeIndex) -> tuple[dict, dict, dict]:
+    """Return the active conditions over time on ``block``, each as name -> {time: ...}: pairs, mixed conditions, sides of pairs."""
+    pairs, mixed, sides = {}, {}, {}
     for name, by_time in times.families_in(block.component_objects(Complementarity, active=True, descend_into=Block)).items():
         for t, data in ((t, data) for t, data in by_time.items() if data.active):
-            group = mixed if isinstance(read_complementarity(data), Mixed) else pairs
-            group.setdefault(name, {})[t] = data
-    return pairs, mixed
+            condition = read_complementarity(data)
+            if isinstance(condition, Mixed):
+                mixed.setdefault(name, {})[t] = data
+            else:
+                pairs.setdefault(name, {})[t] = data
+                sides.setdefault(name, {})[t] = condition
+    return pairs, mixed, sides
 
 
 def refuse_lists_of_times(block: Block, times: TimeIndex) -> None:
@@ -134,19 +150,23 @@ def _variables(condition):
     return [v for side in sides for v in identify_variables(side)]
 
 
-def read_time_complementarities(moving: MovingGrid, conditions: dict, continuity: Continuity) -> list[TimeComplementarity]:
+def read_time_complementarities(
+    moving: MovingGrid, conditions: dict, sides: dict, continuity: Continuity
+) -> list[TimeComplementarity]:
     """Return the time complementarities of pairs over time.
 
     Parameters
     ----------
     moving : MovingGrid
     conditions : dict name -> {time: ComplementarityData}
+    sides : dict name -> {time: Pair}
+        those that are read already
     continuity : Continuity
         read at the inner label of each condition
     """
     names, wrt = _distinct_names(conditions), moving.wrt
     found = [
-        _read_time_complementarity(names[name], by_time, inner_label(by_time, wrt), continuity)
+        _read_time_complementarity(names[name], by_time, sides.get(name), inner_label(by_time, wrt), continuity)
         for name, by_time in conditions.items()
     ]
     return found
@@ -165,9 +185,9 @@ def warn_unknown(moving: MovingGrid, conditions: Iterable[TimeComplementarity]) 
         )
 
 
-def _read_time_complementarity(name, by_time, inner, continuity):
+def _read_time_complementarity(name, by_time, sides, inner, continuity):
     """One time complementarity; without an inner label nothing is known of its sides."""
-    sides = {t: read_complementarity(c) for t, c in by_time.items()}
+    sides = sides or {t: read_complementarity(c) for t, c in by_time.items()}
     if inner is None:
         return TimeComplementarity(name, by_time, sides, (False, False))
     continuous = tuple(map(continuity.holds, sides[inner]))

@@ -75,10 +75,11 @@ PLACES = (Block, Disjunct)
 
 @dataclass
 class _Switching:
-    """All that switches over time: pairs and mixed conditions (name -> {time: data}), and laws of modes, jumps and contacts."""
+    """All that switches: pairs, mixed conditions and sides of pairs (name -> {time: ...}), laws of modes, jumps and contacts."""
 
     pairs: dict
     mixed: dict
+    sides: dict
     modes: list
     jumps: list
     contacts: list
@@ -236,9 +237,8 @@ def _rebuild_integrals(instance, moving):
 
 
 def _read_switching(instance, wrt, config):
-    pairs, mixed = conditions_over_time(instance, TimeIndex(wrt))
-    model = instance.model()
-    switching = _Switching(pairs, mixed, read_hysteresis(model, wrt), read_jumps(model, wrt), read_contacts(model, wrt))
+    conditions, model = conditions_over_time(instance, TimeIndex(wrt)), instance.model()
+    switching = _Switching(*conditions, read_hysteresis(model, wrt), read_jumps(model, wrt), read_contacts(model, wrt))
     check_guards(switching.jumps, _held(config, wrt))
     if not switching:
         _refuse_disjunctions(instance, TimeIndex(wrt))
@@ -285,7 +285,7 @@ def _is_generated_pair(by_time):
 
 def _read_complementarities(moving, switching, continuity):
     pairs = switching.pairs | split_mixed(moving, switching.mixed, continuity)
-    found = read_time_complementarities(moving, pairs, continuity)
+    found = read_time_complementarities(moving, pairs, switching.sides, continuity)
     if not moving.grid.right_is_collocated:
         warn_gauss_on_curved_surfaces(moving, found, continuity)
     return found
