@@ -9,7 +9,6 @@ import logging
 from collections import Counter, defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
 
 from pyomo.core import Block
 from pyomo.core.expr.visitor import identify_variables
@@ -74,6 +73,7 @@ class TimeComplementarity:
     departures: dict = field(default_factory=dict)
     from_left: bool = True
     has_right_limits: bool = False
+    _sums: dict = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def points(self, element: Element) -> list[float]:
         """Return the labels of the collocation points of ``element`` at which the condition exists."""
@@ -98,10 +98,6 @@ class TimeComplementarity:
         if element.n not in self._sums:
             self._sums[element.n] = sum_of(self.values(element, 0)), sum_of(self.values(element, 1))
         return self._sums[element.n]
-
-    @cached_property
-    def _sums(self):
-        return {}
 
 
 def conditions_over_time(block: Block, times: TimeIndex) -> tuple[dict, dict, dict]:

@@ -173,7 +173,7 @@ class Completions:
         self._subsolves.keep_least_infeasible(relaxed.w)
         if eps <= AROUND[0] * ROUND_OFF:
             self._last = self._c.evaluate(relaxed.w).f
-            self._promise = self._last if self._subsolves.holds(relaxed) else self._promise
+            self._promise = self._last if self._subsolves.usable(relaxed) else self._promise
         if not self._is_known(relaxed):
             seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
             end = self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))

@@ -90,7 +90,7 @@ class Homotopy:
             self.run.eps = self._position.eps
             relaxed = self._relax(self._position)
             self._subsolves.keep_least_infeasible(relaxed.w)
-            step = self._next if self._subsolves.holds(relaxed) else self._recover
+            step = self._next if self._subsolves.usable(relaxed) else self._recover
             self._position = step(self._position, relaxed)
 
     def _relax(self, position):

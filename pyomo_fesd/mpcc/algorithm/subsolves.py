@@ -9,7 +9,7 @@ import numpy as np
 
 from pyomo_fesd.core import DeferredInterrupt, phase
 from pyomo_fesd.mpcc.algorithm.state import LogEntry, Outcome, Run, Setup, Stop, Tolerances
-from pyomo_fesd.mpcc.nlp import DIVERGING, nlp_solver
+from pyomo_fesd.mpcc.nlp import DIVERGING, STALLED, nlp_solver
 from pyomo_fesd.mpcc.subproblems import (
     RELAXATIONS,
     Branch,
@@ -32,9 +32,9 @@ SUGGESTION = {'mip_max_nodes': 100, 'mip_max_improving_sols': 1, 'presolve': 'of
 SHARE, LEAST_TIME = 0.2, 0.5
 #: Statuses of a problem that an NLP solver found infeasible: the model's own rows may hold there, the pairs do not.
 INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
-#: The violation from which on a branch NLP that is not solved has no point: a multiplier may be so large that the objective owes
-#: all to what is left, as with a force of 1e7 at a gap of 1e-8.
-LEFT = 1e-8
+#: Statuses where Ipopt cannot make the violation smaller, and the violation from which on such a point is none: a multiplier may be
+#: so large that the objective owes all to what is left, as with a force of 1e7 at a gap of 1e-8.
+STUCK, LEFT = ('Restoration_Failed', STALLED), 1e-8
 #: Ipopt scales rows and an objective down whose gradients at the start of an NLP have larger entries than this; and rows where
 #: parts have extents, without impacts.
 STEEP, STEEPEST_ROW = 1e2, 1e4
@@ -196,8 +196,8 @@ class Subsolves:
         self._log('recovery', 0.0, w, 0, message, time.perf_counter())
 
     def usable(self, result):
-        """Whether a branch NLP is solved, or ended where the model's constraints hold to the last digits, but not as infeasible."""
-        return result.solved or (self.holds(result) and self.violation(result.w) <= LEFT)
+        """Whether an NLP's point can be used: it ``holds``, and to the last digits where Ipopt could not do better."""
+        return self.holds(result) and (result.status not in STUCK or self.violation(result.w) <= LEFT)
 
     def holds(self, result):
         """Whether an NLP is solved, or was stopped where the model's constraints hold, but not as infeasible."""
