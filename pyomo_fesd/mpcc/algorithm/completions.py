@@ -210,7 +210,7 @@ class Completions:
             if is_complete:
                 self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
             result, equal = self._branches.solutions.beside(completed)
-            if result is not None and self._subsolves.holds(result):
+            if result is not None and self._subsolves.usable(result):
                 self._keep(result, equal)
                 end = self._c.evaluate(result.w).f
             if result is None or not result.stopped:

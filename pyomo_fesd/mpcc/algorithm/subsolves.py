@@ -196,12 +196,9 @@ class Subsolves:
         self._log('recovery', 0.0, w, 0, message, time.perf_counter())
 
     def usable(self, result):
-        """Whether an NLP's point can be used: it ``holds``, and to the last digits where Ipopt could not do better."""
-        return self.holds(result) and (result.status not in STUCK or self.violation(result.w) <= LEFT)
-
-    def holds(self, result):
-        """Whether an NLP is solved, or was stopped where the model's constraints hold, but not as infeasible."""
-        return result.solved or (result.status not in USELESS and self.violation(result.w) <= self.tolerances.feasibility)
+        """Whether an NLP's point can be used: solved, or stopped where the model's constraints hold, but not as infeasible."""
+        most = min(LEFT, self.tolerances.feasibility) if result.status in STUCK else self.tolerances.feasibility
+        return result.solved or (result.status not in USELESS and self.violation(result.w) <= most)
 
     def violation(self, w):
         """The largest violation of rows and bounds."""
