@@ -11,6 +11,7 @@ from typing import Optional
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Stop
+from pyomo_fesd.mpcc.algorithm.subsolves import LEFT
 from pyomo_fesd.mpcc.nlp import NlpResult
 
 #: Iterations of the first and of the second attempt; and how many more if they only lead to a feasible point (None: no limit).
@@ -134,6 +135,9 @@ class BranchSolutions:
 
     def _measured(self, found):
         """The solution with its objective, and what that owes to violated rows; none where it shows no minimum."""
+        if self.at_once and not found.nlp.solved and self._subsolves.violation(found.nlp.w) > LEFT:
+            # places of least extent hide it where rows contradict each other, and nothing leads on from there
+            return _Solution()
         found.f = self._c.evaluate(found.nlp.w).f
         if np.abs(found.nlp.w).max(initial=0.0) > UNBOUNDED:
             if found.f < self._c.evaluate(self._c.x0).f:
