@@ -90,9 +90,9 @@ class BranchSolutions:
             self._known[key] = found = self._solution(w, zero, duals, below, **more)
         return self._point(found, below, enough)
 
-    def up_to(self, enough, suits=lambda w: True):
+    def up_to(self, enough, suits=lambda f, w: True):
         """Yield the certified ones of the solutions found so far that suit and are at most ``enough``, the best first."""
-        found = [one for one in self._known.values() if one.nlp is not None and one.f <= enough and suits(one.nlp.w)]
+        found = [one for one in self._known.values() if one.nlp is not None and one.f <= enough and suits(one.f, one.nlp.w)]
         points = (self._point(one, np.inf, np.inf) for one in sorted(found, key=attrgetter('f')))
         return (point for point in points if point is not None and point.certificate.certified)
 

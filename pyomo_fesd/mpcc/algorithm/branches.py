@@ -125,7 +125,7 @@ class Branches:
         best = self.run.point
         if best is not None and not best.certificate.certified:
             enough, number = as_good(best, self.run.lowest), self.neighbours.number_of_short
-            known = chain(self.solutions.up_to(enough, lambda w: not number(w)), self.solutions.up_to(enough))
+            known = chain(self.solutions.up_to(enough, lambda f, w: not number(w)), self.solutions.up_to(enough))
             self.run.point = next(known, best)
 
     def try_neighbours(self):

@@ -13,6 +13,9 @@ from pyomo_fesd.mpcc.algorithm.branch_solutions import SECOND, as_good
 from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
 from pyomo_fesd.mpcc.subproblems import Stationarity
 
+#: Points with objectives as close as this, relative, are the same one, reached in other ways.
+SAME = 1e-8
+
 
 class ShortPlaces:
     """The places of least extent of one run.
@@ -24,7 +27,7 @@ class ShortPlaces:
 
     def __init__(self, branches):
         self._branches, self._solutions, self._neighbours = branches, branches.solutions, branches.neighbours
-        self._tried = set()
+        self._tried, self._left_out = set(), []
 
     def are_at(self, point) -> bool:
         """Whether a variable of ``point`` is at its lower bound, so that there are branches for ``better``."""
@@ -41,7 +44,7 @@ class ShortPlaces:
 
     def leave_out(self, point):
         """Do not return this point: its orders have been tried, and one of them may lead to the point that asks for another."""
-        self._tried.add(point.w.tobytes())
+        self._left_out.append(point.f)
 
     def fewer(self, point):
         """A certified point in such a branch, or in one without any of them, with fewer variables at their lower bound; or None.
@@ -57,9 +60,10 @@ class ShortPlaces:
         known = next(self._solutions.up_to(enough, partial(self._is_new_with_fewer, max(number, 1))), None)
         return self._beside(point, enough, number) if known is None else known
 
-    def _is_new_with_fewer(self, number, w):
-        """Whether values were not tried yet, and have fewer variables at their lower bound than a ``number``."""
-        return w.tobytes() not in self._tried and self._neighbours.number_of_short(w) < number
+    def _is_new_with_fewer(self, number, f, w):
+        """Whether a point is not left out, and has fewer variables at their lower bound than a ``number``."""
+        is_left_out = any(abs(f - other) <= SAME * max(1.0, abs(f)) for other in self._left_out)
+        return not is_left_out and self._neighbours.number_of_short(w) < number
 
     def _beside(self, point, enough, number):
         """A certified point with less than a ``number`` of these variables, in a branch beside ``point``."""
@@ -69,7 +73,7 @@ class ShortPlaces:
             self._tried.add(zero.tobytes())
             solved = self._solutions.certified(point.w, zero, max_iter=SECOND, below=enough, enough=enough)
             end = self._branches.improve_from(solved, True)
-            if end is None or self._neighbours.number_of_short(end.w) >= number:
+            if end is None or not self._is_new_with_fewer(number, end.f, end.w):
                 continue
             if end.certificate.grade is Stationarity.LIMITED:
                 end = self._fewer(end, enough)
