@@ -31,6 +31,7 @@ from pyomo_fesd.mpcc.multistart import Multistart
 from pyomo_fesd.mpcc.nlp import Deadline, OutOfTime, PlainIpopt
 from pyomo_fesd.mpcc.reporting import Loader, LogTable, RunRecord, StartsTable, fill_results, log_streams, reporter
 from pyomo_fesd.mpcc.subproblems import (
+    FREE,
     RELAXATIONS,
     Certificate,
     Lpec,

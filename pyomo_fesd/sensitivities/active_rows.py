@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyomo_fesd.mpcc import active_sets, settle, without_constant
+from pyomo_fesd.mpcc import FREE, active_sets, settle, without_constant
 
 #: Where something is minimised, Ipopt leaves an inequality without a multiplier at the root of its complementarity tolerance.
 NEAR = 2e-5
@@ -55,10 +55,10 @@ def active_rows(c, sides, w, near, eta, name) -> ActiveRows:
     at = c.evaluate(w)
     sets = active_sets(at.G, at.H, near)
     sets = replace(sets, zero=settle(c, sides, w, sets.zero))
-    lower, upper = sides.bounds(sets.zero, c.lbx, c.ubx)
-    sets = without_constant(sets, sides, lower == upper)
     # a bi-active pair is open: none of its sides fixes a variable
-    zero = np.where(sets.gamma, -1, sets.zero)
+    lower, upper = sides.bounds(_decided(sets), c.lbx, c.ubx)
+    sets = without_constant(sets, sides, lower == upper)
+    zero = _decided(sets)
     lower, upper = sides.bounds(zero, c.lbx, c.ubx)
     m, q, e = len(c.lbg), len(zero), c.equal.numel()
     is_zero = sides.zero_rows(zero) & (sides.row_of >= 0)
@@ -76,6 +76,11 @@ def active_rows(c, sides, w, near, eta, name) -> ActiveRows:
     at_upper = ~free & (upper == c.ubx) & (lower != c.lbx)
     names = _Names(c, name)
     return ActiveRows(rows, side, is_open, np.where(free, 0, np.where(at_upper, 1, -1)), [names(row) for row in rows])
+
+
+def _decided(sets):
+    """Zero sides of the pairs, none of bi-active ones."""
+    return np.where(sets.gamma, FREE, sets.zero)
 
 
 def _bounded(first, values, low, high, near):

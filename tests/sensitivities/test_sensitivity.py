@@ -134,8 +134,9 @@ def test_a_biactive_pair_with_positive_multipliers_stays():
 
 def test_refuses_without_strict_complementarity():
     m = static(0, 0)
-    with pytest.raises(FesdError, match='strict complementarity'):
-        sensitivity(m, m.a, m.x)
+    for p, v in ((m.a, m.x), (m.b, m.y)):
+        with pytest.raises(FesdError, match='strict complementarity'):
+            sensitivity(m, p, v)
     # exactly at the bound that only just holds: one-sided derivatives differ
     m = controlled(2.0)
     m.most.set_value(m.u[1].value)
