@@ -28,6 +28,9 @@ CYCLES, PROGRESS = 6, 1e-2
 #: one misses.
 PATHS = {'auto': (('scholtes', 1.0), ('elastic', 1.0))}
 LOOSER = (1.0, 10.0)
+#: option ``relaxation`` -> one more path, where relaxations still promise as much after all of these: which points the rounds find
+#: depends on round-off (a ball: 10 to 240, all of them promised 3).
+FURTHER = {'auto': ('elastic', 10.0)}
 #: A further path is followed where the relaxations around the best point have an objective that is smaller by this part, or one of
 #: the path before was infeasible.
 GAP = 0.5
@@ -62,7 +65,7 @@ class Completions:
         self._c, self._options, self._complete, self._after = setup.compiled, setup.options, setup.complete, setup.after
         self._subsolves, self._branches, self.run = subsolves, branches, subsolves.run
         form = self._options.relaxation
-        self._paths = PATHS.get(form) or tuple((form, looser) for looser in LOOSER)
+        self._paths, self._further = PATHS.get(form) or tuple((form, looser) for looser in LOOSER), FURTHER.get(form)
         self._form, self._share = self._paths[0][0], 1.0
         self._deadline, self._possible = setup.deadline.part(SHARE), False
         # objectives of the last relaxation that holds, and of the last one
@@ -82,6 +85,9 @@ class Completions:
                 break
         if self._left is not None and self._possible and self._is_far_below(self._last):
             self._follow(*self._left, True)
+        if self._further is not None and self._possible and self._promising():
+            form, looser = self._further
+            self._follow(form, start, self._options.eps_init * looser, True)
         if self.run.point is not None:
             self._certify()
 
