@@ -28,8 +28,8 @@ UNEVEN = 2e-2
 #: A branch that is to be below another objective is left where multipliers stay above this, relative to that: where it has a
 #: solution at all, a violation of 1e-4 is worth a tenth of the objective there.
 STEEP = 1e3
-#: A branch with decisions of its sides is left where its violation does not halve in so many iterations: of those that stall as
-#: long, few have a solution, and the others used two thirds of all iterations of hard problems.
+#: A branch with decisions of its sides is left where its violation does not halve in so many iterations: in two runs (a ball and
+#: discs) that would have saved a third of all iterations, and stopped 8 NLPs that ended solved.
 STALL = 50
 #: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
 #: one it came from an unbounded relaxation.
