@@ -64,8 +64,8 @@ class _StopCallback(ca.Callback):
     def begin(self, max_iter, steepest, stall, lbg, ubg):
         """Begin a call with its limits."""
         self._left, self._steepest, self._running = np.inf if max_iter is None else max_iter, steepest, 0
-        # the least violation up to each of the last iterations
-        self._least = None if stall is None else deque(maxlen=stall + 1)
+        # the least violation up to each of the last iterations, since it was last above the limit of the stall
+        self._stall, self._least = stall, None if stall is None else deque(maxlen=stall.iterations + 1)
         self._lbg, self._ubg = (np.asarray(bound, dtype=float) for bound in (lbg, ubg))
 
     @property
@@ -105,7 +105,9 @@ class _StopCallback(ca.Callback):
         violation = max((self._lbg - g).max(initial=0.0), (g - self._ubg).max(initial=0.0))
         is_steep = violation > VIOLATED and np.abs(lam_g).max(initial=0.0) > self._steepest
         self._running = self._running + 1 if is_steep else 0
-        if self._least is not None:
+        if self._least is not None and violation > self._stall.below:
+            self._least.clear()
+        elif self._least is not None:
             self._least.append(min([violation, *list(self._least)[-1:]]))
 
 

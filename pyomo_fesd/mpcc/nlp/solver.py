@@ -8,6 +8,7 @@ import importlib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -111,6 +112,13 @@ class NlpResult:
         return replace(self, lam_x=lam_x, lam_g=lam_g)
 
 
+class Stall(NamedTuple):
+    """The largest violation of a row has to halve in so many ``iterations``, as long as it stays at most ``below``."""
+
+    iterations: int
+    below: float = np.inf
+
+
 class NlpSolver(ABC):
     """``min f(w; p)  s.t.  lbg <= g(w; p) <= ubg, lbx <= w <= ubx``, built once, for changing bounds and parameter p.
 
@@ -156,9 +164,9 @@ class NlpSolver(ABC):
             iterations that this call may use, where they can be counted
         steepest : float
             limit of the multipliers of rows, where the solver shows them on its way: with larger ones, it ends as ``DIVERGING``
-        stall : int, optional
-            iterations in which the largest violation of a row has to halve, where the solver shows it; if it does not, the solve
-            ends as ``STALLED``
+        stall : Stall, optional
+            how the largest violation of a row has to shrink, where the solver shows it; if it does not, the solve ends as
+            ``STALLED``
 
         Returns
         -------

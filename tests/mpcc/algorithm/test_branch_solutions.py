@@ -12,6 +12,8 @@ from pyomo_fesd.mpcc.algorithm.branch_solutions import BranchSolutions
 from pyomo_fesd.mpcc.compile.compile import compile_mpcc
 from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc
 
+TOLERANCES = SimpleNamespace(feasibility=1e-6)
+
 
 @pytest.mark.parametrize('violation', [0.0, 1e-7, -1e-7])
 def test_multipliers_say_what_a_violation_is_worth(violation):
@@ -23,7 +25,7 @@ def test_multipliers_say_what_a_violation_is_worth(violation):
     m.cost = pyo.Objective(expr=300 * m.x)
     c = compile_mpcc(read_mpcc(m), HierarchicalTimer())
     lam = np.array([{'low': 200.0, 'equal': 100.0}[row.name] for row in c.constraints])
-    solutions = BranchSolutions(SimpleNamespace(compiled=c, tolerances=None))
+    solutions = BranchSolutions(SimpleNamespace(compiled=c, tolerances=TOLERANCES))
     owed = solutions._owed(SimpleNamespace(w=c.x0, lam_g=np.append(lam, 1e6)))
     rows, _ = c.violations(c.x0)
     assert owed == pytest.approx(sum(lam * rows), abs=1e-12) and (owed > 0) == (violation != 0)
@@ -40,7 +42,7 @@ def test_decisions_that_a_solution_asks_for_are_added_some_times(asked, found):
     rest = [solution(k) for k in (*asked, 0)]
     subsolves = SimpleNamespace(
         compiled=SimpleNamespace(eta=SimpleNamespace(numel=lambda: 4)),
-        tolerances=None,
+        tolerances=TOLERANCES,
         asked=lambda w, zero: w,
         branch=lambda w, zero, equal, weight, duals: rest.pop(0),
     )
@@ -48,3 +50,21 @@ def test_decisions_that_a_solution_asks_for_are_added_some_times(asked, found):
     assert (solved is not None) == found
     if found:
         assert not rest and np.flatnonzero(equal).tolist() == [0, *asked]
+
+
+@pytest.mark.parametrize('at_once', [False, True])
+def test_only_a_branch_with_decisions_is_left_above_the_tolerance(at_once):
+    limits = []
+
+    def attempt(*args, stall, **more):
+        limits.append(stall)
+
+    subsolves = SimpleNamespace(
+        compiled=SimpleNamespace(eta=SimpleNamespace(numel=lambda: 1)),
+        tolerances=TOLERANCES,
+        attempt=attempt,
+        asked=lambda *_: True,
+    )
+    assert BranchSolutions(subsolves, at_once).certified(None, None, duals=True) is None
+    # one without decisions comes back from violations of any size, as in pack-comp1p-32 of MacMPEC
+    assert [limit.below for limit in limits] == [np.inf if at_once else TOLERANCES.feasibility]

@@ -21,6 +21,7 @@ from pyomo_fesd.mpcc.nlp.solver import (
     STALLED,
     NlpResult,
     NlpSolver,
+    Stall,
     nlp_solver,
 )
 
@@ -146,9 +147,12 @@ def test_multipliers_that_stay_above_their_limit_end_the_solve(steepest, diverge
         assert result.iterations < RUNNING and not (result.solved or result.stopped)
 
 
-@pytest.mark.parametrize(('constant', 'stall', 'stalls'), [(1.0, 3, True), (1.0, None, False), (0.0, 3, False)])
+@pytest.mark.parametrize(
+    ('constant', 'stall', 'stalls'),
+    [(1.0, Stall(3), True), (1.0, None, False), (0.0, Stall(3), False), (1.0, Stall(3, 2.0), True), (1.0, Stall(3, 0.9), False)],
+)
 def test_a_violation_that_does_not_halve_ends_the_solve(constant, stall, stalls):
-    # without the constant each of Newton's iterations takes the violation to a third
+    # without the constant each of Newton's iterations takes the violation to a third; with it, it stays above 1
     x, p = ca.SX.sym('x'), ca.SX(0, 1)
     problem = nlp_solver('ipopt')('parabola', x, p, x, x**16 + constant, {'max_iter': 300})
     result = problem.solve(np.array([2.0]), [], np.array([-INF]), np.array([INF]), np.zeros(1), np.zeros(1), stall=stall)
