@@ -31,7 +31,7 @@ STEEP = 1e3
 #: A branch with decisions of its sides is left where its violation does not halve in so many iterations: in two runs (a ball and
 #: discs) that would have saved a third of all iterations, and stopped 8 NLPs that ended solved.
 STALL = 50
-#: Any other one is left where its violation is within the tolerance and does not halve in so many iterations: rows that
+#: Any branch is left where its violation is within the tolerance and does not halve in so many iterations: rows that
 #: contradict each other by less than the tolerance (pack-rig1-32 of MacMPEC: 10 of 13 NLPs less, the same minimum).
 CONTRADICTING = 10
 #: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
@@ -74,7 +74,7 @@ class BranchSolutions:
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
         self.at_once, self._known = at_once and self._c.eta.numel() > 0, {}
-        self._stall = Stall(STALL) if self.at_once else Stall(CONTRADICTING, self._tolerances.feasibility)
+        self._stalls = (Stall(CONTRADICTING, self._tolerances.feasibility), *[Stall(STALL)] * self.at_once)
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -105,7 +105,7 @@ class BranchSolutions:
         It has the decisions in force at the point, with which the LPEC found its direction.
         """
         equal = self._subsolves.in_force(point.w, point.equal)
-        solved, equal = self._with_all(self._subsolves.branch(point.w, zero, equal, 0.0, stall=self._stall), zero, equal)
+        solved, equal = self._with_all(self._subsolves.branch(point.w, zero, equal, 0.0, stalls=self._stalls), zero, equal)
         return None if solved is None else self._point(self._measured(_Solution(nlp=solved, equal=equal)), np.inf, enough)
 
     def _with_all(self, solved, zero, equal, left=ASKED, **more):
@@ -128,7 +128,7 @@ class BranchSolutions:
         return Point(found.nlp, found.f, found.certificate, found.equal) if found.certificate.feasible else None
 
     def _solution(self, w, zero, duals, below, **more):
-        more |= {'steepest': STEEP * max(1.0, abs(below)), 'stall': self._stall}
+        more |= {'steepest': STEEP * max(1.0, abs(below)), 'stalls': self._stalls}
         found = self._solve(w, zero, duals, below, **more)
         if found.nlp is not None and not found.nlp.solved and more.get('max_iter') in MORE:
             # feasible, so the branch has a solution, but not at its minimum yet
@@ -198,13 +198,13 @@ class BranchSolutions:
             return first, None
         return self.imposed(first.w, zero, ~np.asarray(apart), self._subsolves.branch, duals=first, **more)
 
-    def beside(self, w):
+    def beside(self, w, **more):
         """The result, usable or not, of the branch NLP that ``w`` names with the decisions in force there, and these.
 
         ``w`` is exactly complementary, and its decisions hold.  None if the bounds of the branch contradict each other.
         """
         zero = self._subsolves.sets(w, self._tolerances.biactive).zero
-        return self.imposed(w, zero, True, self._subsolves.attempt)
+        return self.imposed(w, zero, True, self._subsolves.attempt, **more)
 
     def imposed(self, w, zero, among, solve, **more):
         """A branch NLP from ``w`` with the decisions that its eta asks for, ``among`` some; a tentative one only if it can be."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pyomo_fesd.mpcc.algorithm.neighbours import AT_BOUND
 from pyomo_fesd.mpcc.algorithm.recovery import RECOVERIES
 from pyomo_fesd.mpcc.algorithm.search import Verdict
 from pyomo_fesd.mpcc.nlp import NlpResult
@@ -192,7 +193,7 @@ class Homotopy:
         return None not in (before, now) and self._gap.same(max(before, now), best)
 
     def _other_path(self, position, relaxed):
-        """After a path without a certified point: the same path with wider bounds if they may be missing, else the next one."""
+        """After a path without a certified point: the same path with wider bounds if they were missing, else the next one."""
         if self._branches is None:
             return None
         if self.run.point is not None and not self._certified():
@@ -200,15 +201,21 @@ class Homotopy:
             self._branches.try_neighbours()
         if self._certified() or self._hopeless():
             return None
-        wider = self._stopped_by_guide_bounds() and self._c.widen()
+        wider = (self.run.point is None or self._is_limited()) and self._c.widen()
         if wider and self.run.point is not None:
             self._branches.release()
             if self._certified():
                 return None
-        path = position.path + (not wider)
+        again = wider and self._bounds_matter(position, relaxed.w)
+        path = position.path + (not again)
         if path == len(self._paths):
             return None
-        return self._begin(path, "nothing certified on this path, " + ("wider bounds" if wider else "other form"), relaxed)
+        return self._begin(path, "nothing certified on this path, " + ("wider bounds" if again else "other form"), relaxed)
+
+    def _bounds_matter(self, position, w):
+        """Whether a path that ends at ``w`` is repeated without guide bounds: what they do not hold would end there again."""
+        is_held = bool((w[self._c.guided] < self._c.guide_lbx[self._c.guided] + AT_BOUND).any())
+        return is_held or self.run.point is not None or position.path + 1 == len(self._paths)
 
     def _begin(self, path, why, relaxed):
         """The first position of another path."""
@@ -217,9 +224,9 @@ class Homotopy:
         self._branches.forget()
         return _Position(path, self._start, self._options.eps_init)
 
-    def _stopped_by_guide_bounds(self):
-        """Whether there is no feasible point, or one that only guide bounds keep from descending."""
-        return self.run.point is None or self.run.point.certificate.grade is Stationarity.LIMITED
+    def _is_limited(self):
+        """Whether only guide bounds keep the incumbent from descending."""
+        return self.run.point.certificate.grade is Stationarity.LIMITED
 
     def _hopeless(self):
         """Whether nothing feasible was found, and no branch of so few pairs has a feasible point from the start."""

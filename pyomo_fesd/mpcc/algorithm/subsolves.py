@@ -59,8 +59,6 @@ class Subsolves:
         self._sides, self._nlps, self._solver = setup.cache.sides, setup.cache.nlps, nlp_solver(setup.options.nlp_solver)
         self._lpec = Lpec(self._c, self._sides, self._options.lpec_options.value(), setup.deadline)
         self.parts = Parts(self._c)
-        common = self._c, self._sides, self.parts, self._lpec, tolerances
-        self._insertions, self._end_insertions = Insertions(*common), EndInsertions(*common)
 
     # called by the algorithm
 
@@ -126,22 +124,26 @@ class Subsolves:
 
     def insertion(self, point, sets, order, unchanged):
         """The ``Verdict`` of parts that are inserted into a point in a row; ``unchanged`` are such that change nothing there."""
-        return self._verdict(point, lambda equal: self._insertions.verdict(point.w, sets, equal, order, unchanged))
+        return self._verdict(Insertions, point, sets, order, unchanged)
 
     def insertion_at_end(self, point, sets, order):
         """The ``Verdict`` of a part of no extent at an end of a point."""
-        return self._verdict(point, lambda equal: self._end_insertions.verdict(point.w, sets, equal, order))
+        return self._verdict(EndInsertions, point, sets, order)
 
-    def _verdict(self, point, judge):
+    def _verdict(self, kind, point, sets, *order):
+        """The ``Verdict`` of a kind of insertion; not decided where its LPECs would take long: there may be many orders."""
         equal = self._c.evaluate(point.w).eta > self.tolerances.eta if point.equal is None else self.in_force(point.w, point.equal)
         with self._timed('lpec') as started:
-            verdict = judge(equal)
+            verdict = self._judge(kind, self.patience()['time_limit']).verdict(point.w, sets, equal, *order)
         self._log('order', 0.0, point.w, 0, verdict.value, started)
         return verdict
 
     def at_limit(self, w, zero, extents, size):
         """``w`` with the values that parts of extent 0 have as they grow; None without any."""
-        return self._insertions.at_limit(w, zero, extents, size)
+        return self._judge(Insertions).at_limit(w, zero, extents, size)
+
+    def _judge(self, kind, seconds=None):
+        return kind(self._c, self._sides, self.parts, self._lpec.at_most(seconds), self.tolerances)
 
     def suggestion(self, w, sets, Delta):
         """Solve an LPEC that may stop early."""

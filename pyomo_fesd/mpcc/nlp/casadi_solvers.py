@@ -52,6 +52,24 @@ NOT_BEGUN = ('Not_Enough_Degrees_Of_Freedom', 'Invalid_Problem_Definition', 'Inv
 UNO_TYPES = {0: int, 1: float, 2: bool, 3: str}
 
 
+class _Violations:
+    """The least violation up to each of the last iterations, since it was last above the limit of a ``Stall``."""
+
+    def __init__(self, limit):
+        self._below, self._least = limit.below, deque(maxlen=limit.iterations + 1)
+
+    def add(self, violation):
+        if violation > self._below:
+            self._least.clear()
+        else:
+            self._least.append(min([violation, *list(self._least)[-1:]]))
+
+    @property
+    def stall(self):
+        """Whether they have not halved."""
+        return len(self._least) == self._least.maxlen and self._least[-1] > max(VIOLATED, self._least[0] / 2)
+
+
 class _StopCallback(ca.Callback):
     """Asks the solver to stop at the deadline, at the limits of a call, or at Ctrl-C."""
 
@@ -61,22 +79,16 @@ class _StopCallback(ca.Callback):
         self._g, self._lam_g = map(ca.nlpsol_out().index, ('g', 'lam_g'))
         self.construct('watch', {})
 
-    def begin(self, max_iter, steepest, stall, lbg, ubg):
+    def begin(self, max_iter, steepest, stalls, lbg, ubg):
         """Begin a call with its limits."""
         self._left, self._steepest, self._running = np.inf if max_iter is None else max_iter, steepest, 0
-        # the least violation up to each of the last iterations, since it was last above the limit of the stall
-        self._stall, self._least = stall, None if stall is None else deque(maxlen=stall.iterations + 1)
+        self._violations = [_Violations(limit) for limit in stalls]
         self._lbg, self._ubg = (np.asarray(bound, dtype=float) for bound in (lbg, ubg))
 
     @property
     def status(self):
         """The status of a call that was stopped by its own limits; None of another one."""
-        return DIVERGING if self._running >= RUNNING else STALLED if self._stalls else None
-
-    @property
-    def _stalls(self):
-        least = self._least
-        return bool(least) and len(least) == least.maxlen and least[-1] > max(VIOLATED, least[0] / 2)
+        return DIVERGING if self._running >= RUNNING else STALLED if any(v.stall for v in self._violations) else None
 
     def get_n_in(self):
         return ca.nlpsol_n_out()
@@ -95,20 +107,18 @@ class _StopCallback(ca.Callback):
 
     def eval_buffer(self, arg, res):
         self._left -= 1
-        if self._steepest < np.inf or self._least is not None:
+        if self._steepest < np.inf or self._violations:
             self._look_at(*(np.frombuffer(arg[i].cast('B')) for i in (self._g, self._lam_g)))
         res[0].cast('d')[0] = self._left < 0 or bool(self.status) or self._deadline.expired() or self.interrupt.pressed
         return 0
 
     def _look_at(self, g, lam_g):
-        """Count iterations with a violated row and a multiplier above its limit; keep the least violation."""
+        """Count iterations with a violated row and a multiplier above its limit; keep the violation."""
         violation = max((self._lbg - g).max(initial=0.0), (g - self._ubg).max(initial=0.0))
         is_steep = violation > VIOLATED and np.abs(lam_g).max(initial=0.0) > self._steepest
         self._running = self._running + 1 if is_steep else 0
-        if self._least is not None and violation > self._stall.below:
-            self._least.clear()
-        elif self._least is not None:
-            self._least.append(min([violation, *list(self._least)[-1:]]))
+        for violations in self._violations:
+            violations.add(violation)
 
 
 class _CasadiNlp(NlpSolver):
@@ -168,10 +178,10 @@ class _CasadiNlp(NlpSolver):
             self._made[warm] = ca.nlpsol(self._name, self.PLUGIN, self._problem, settings)
         return self._made[warm]
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stall=None):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
         """Solve from ``w0``; see ``NlpSolver``."""
         solver = self._solver_for(duals is not None)
-        self._watch.begin(max_iter, steepest, stall, lbg, ubg)
+        self._watch.begin(max_iter, steepest, stalls, lbg, ubg)
         start = {} if duals is None else {'lam_x0': duals.lam_x, 'lam_g0': duals.lam_g}
         given = {'x0': w0, 'p': p, 'lbx': lbx, 'ubx': ubx, 'lbg': lbg, 'ubg': ubg} | start
         with DeferredInterrupt() as self._watch.interrupt:
@@ -231,7 +241,7 @@ class CasadiUno(_CasadiNlp):
         self._varying, self._g = rows_with_variables(g, x), ca.Function('g', [x, p], [ca.densify(g)])
         super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, derivatives, options)
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stall=None):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
         """Solve from ``w0``; see ``NlpSolver``."""
         varying = self._varying
         g, lam_g = self._g(w0, p).full().ravel(), np.zeros(len(varying))
@@ -239,7 +249,7 @@ class CasadiUno(_CasadiNlp):
             return self._failed(w0, p, len(varying), 'infeasible')
         if duals is not None:
             duals = replace(duals, lam_g=duals.lam_g[varying])
-        result = super().solve(w0, p, lbx, ubx, lbg[varying], ubg[varying], duals, max_iter, steepest, stall)
+        result = super().solve(w0, p, lbx, ubx, lbg[varying], ubg[varying], duals, max_iter, steepest, stalls)
         lam_g[varying] = result.lam_g
         return replace(result, lam_g=lam_g)
 

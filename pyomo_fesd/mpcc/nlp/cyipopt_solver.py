@@ -110,7 +110,7 @@ class CyIpopt(NlpSolver):
         check_options('cyipopt', options, _refusal)
         self._options = _accepted(tuple((IPOPT | budget).items())) | options
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stall=None):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
         """Solve from ``w0``; see ``NlpSolver``.  Older Ipopts do not show multipliers on their way."""
         callbacks = self._callbacks
         callbacks.p, callbacks.iterations = p, 0

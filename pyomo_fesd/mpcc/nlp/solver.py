@@ -151,7 +151,7 @@ class NlpSolver(ABC):
         pass
 
     @abstractmethod
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stall=None):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
         """Solve from ``w0``; an unsolved problem gives a status, never an error.
 
         Infinite bounds are ``np.inf``; a row or variable with two of them is free, one with equal bounds is an equation or fixed.
@@ -164,7 +164,7 @@ class NlpSolver(ABC):
             iterations that this call may use, where they can be counted
         steepest : float
             limit of the multipliers of rows, where the solver shows them on its way: with larger ones, it ends as ``DIVERGING``
-        stall : Stall, optional
+        stalls : tuple of Stall
             how the largest violation of a row has to shrink, where the solver shows it; if it does not, the solve ends as
             ``STALLED``
 

@@ -102,8 +102,8 @@ class Branch:
             a trust region: bounds of w besides its own
         nearby : bool
             whether only Newton's method may solve it, from the end ``duals`` of a relaxation
-        more : ``max_iter``, ``steepest`` and ``stall`` of ``NlpSolver.solve``; ``duals``, the result of a relaxation or branch with
-            the multipliers to start from
+        more : ``max_iter``, ``steepest`` and ``stalls`` of ``NlpSolver.solve``; ``duals``, the result of a relaxation or branch
+            with the multipliers to start from
 
         Returns
         -------

@@ -1,5 +1,7 @@
 """The path of relaxations: how eps falls, where it ends, and the mode that is nothing else."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pyomo.environ as pyo
 import pytest
@@ -11,6 +13,7 @@ from pyomo.contrib.solver.common.util import NoOptimalSolutionError
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import homotopy_hints
+from pyomo_fesd.mpcc.algorithm.homotopy import Homotopy
 from pyomo_fesd.mpcc.algorithm.recovery import RECOVERIES
 from pyomo_fesd.mpcc.nlp import NEWTON
 from pyomo_fesd.mpcc.subproblems.relaxation import RELAXATIONS
@@ -157,6 +160,13 @@ def test_a_point_that_only_guide_bounds_hold_goes_on_without_them():
     assert results.extra_info.stationarity == 'B' and pyo.value(m.h) == pytest.approx(0.2)
     assert [s.status for s in steps if s.kind == 'certificate'][:2] == ['LIMITED', 'B']
     assert not any('wider bounds' in s.status for s in steps)
+
+
+@pytest.mark.parametrize(('length', 'path', 'again'), [(0.5, 0, True), (0.6, 0, False), (0.6, 1, True)])
+def test_a_path_is_repeated_without_guide_bounds_where_these_hold_its_end_and_the_last_one_always(length, path, again):
+    c = SimpleNamespace(guided=np.array([True, False]), guide_lbx=np.array([0.5, -np.inf]))
+    homotopy = SimpleNamespace(_c=c, run=SimpleNamespace(point=None), _paths='ab')
+    assert Homotopy._bounds_matter(homotopy, SimpleNamespace(path=path), np.array([length, 0.0])) == again
 
 
 @pytest.mark.parametrize('build', [small_mpccs.bard1, mpcc_collection.no_objective])
