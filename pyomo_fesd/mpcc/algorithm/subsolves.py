@@ -30,6 +30,8 @@ BIACTIVE = 3.0
 #: least time is several times what programs of few pairs need: on a loaded machine their searches end as on an idle one.
 SUGGESTION = {'mip_max_nodes': 100, 'mip_max_improving_sols': 1, 'presolve': 'off'}
 SHARE, LEAST_TIME = 0.2, 0.5
+#: Least seconds for the LPECs of an order: without their answer no point is certified, and a loaded machine should not decide that.
+ORDER_TIME = 5.0
 #: Statuses of a problem that an NLP solver found infeasible: the model's own rows may hold there, the pairs do not.
 INFEASIBLE = ('Infeasible_Problem_Detected', 'infeasible')
 #: Statuses where Ipopt cannot make the violation smaller, and the violation from which on such a point is none: a multiplier may be
@@ -134,7 +136,7 @@ class Subsolves:
         """The ``Verdict`` of a kind of insertion; not decided where its LPECs would take long: there may be many orders."""
         equal = self._c.evaluate(point.w).eta > self.tolerances.eta if point.equal is None else self.in_force(point.w, point.equal)
         with self._timed('lpec') as started:
-            verdict = self._judge(kind, self.patience()['time_limit']).verdict(point.w, sets, equal, *order)
+            verdict = self._judge(kind, self._seconds(ORDER_TIME)).verdict(point.w, sets, equal, *order)
         self._log('order', 0.0, point.w, 0, verdict.value, started)
         return verdict
 
@@ -151,8 +153,11 @@ class Subsolves:
 
     def patience(self) -> dict:
         """HiGHS' limit of time for an LPEC that proves nothing."""
-        spent = sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch'))
-        return {'time_limit': max(LEAST_TIME, SHARE * spent)}
+        return {'time_limit': self._seconds(LEAST_TIME)}
+
+    def _seconds(self, least):
+        """A share of the time that the NLPs took, and at least so many seconds."""
+        return max(least, SHARE * sum(step.seconds for step in self.run.steps if step.kind in ('relaxation', 'branch')))
 
     def certify(self, nlp, equal, at_last=False):
         """Certify the end of a branch NLP, whatever the limits; HiGHS stops at the deadline.
@@ -160,7 +165,7 @@ class Subsolves:
         Where the NLP did not reach its solution exactly a certificate is unlikely, and its LPEC may take longer than all NLPs: it
         stops early, unless the run ends with this point.
         """
-        started, seconds = time.perf_counter(), self.patience()['time_limit']
+        started, seconds = time.perf_counter(), self._seconds(LEAST_TIME)
         lpec = self._lpec.at_most(None if nlp.is_exact or at_last else seconds)
         with phase(self._setup.timer, 'lpec'):
             certificate = certify_point(self._c, lpec, nlp.w, self.tolerances, self.in_force(nlp.w, equal), -nlp.lam_g, seconds)
