@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pyomo_fesd.mpcc.algorithm.branch_solutions import SECOND
 from pyomo_fesd.mpcc.algorithm.state import Point
 from pyomo_fesd.mpcc.algorithm.subsolves import INFEASIBLE
 from pyomo_fesd.mpcc.nlp import NlpResult
@@ -42,9 +43,8 @@ SHARE = 0.6
 #: took with three jobs on two cores, as the load of the machine should not decide which points are found.
 LONGER, LEAST_TIME = 2.0, 10.0
 #: Branch NLPs from one relaxation: one that stops on its way has better values of the free variables, but perhaps the wrong branch.
+#: Each has the iterations of a second attempt: few that take more end solved.
 ATTEMPTS = 2
-#: Iterations of each of them: of 21 that were solved (a ball and discs) 18 took less, and what stops here rarely ends solved.
-ENOUGH = 150
 #: Two relaxations with objectives as close as this, relative, have the same solution; and so have two branches, whose bi-active
 #: pairs may have either side.
 SAME, SAME_BRANCH = 1e-8, 1e-5
@@ -217,7 +217,7 @@ class Completions:
                 break
             if is_complete:
                 self._keep(NlpResult(completed, self._c.evaluate(completed).f, 'given', 0, np.zeros(0), np.zeros(0)))
-            result, equal = self._branches.solutions.beside(completed, max_iter=ENOUGH)
+            result, equal = self._branches.solutions.beside(completed, max_iter=SECOND)
             if result is not None and self._subsolves.usable(result):
                 self._keep(result, equal)
                 end = self._c.evaluate(result.w).f
