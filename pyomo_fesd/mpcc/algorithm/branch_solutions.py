@@ -31,8 +31,8 @@ STEEP = 1e3
 #: A branch with decisions of its sides is left where its violation does not halve in so many iterations: in two runs (a ball and
 #: discs) that would have saved a third of all iterations, and stopped 8 NLPs that ended solved.
 STALL = 50
-#: Any branch is left where its violation is within the tolerance and does not halve in so many iterations: rows that
-#: contradict each other by less than the tolerance (pack-rig1-32 of MacMPEC: 10 of 13 NLPs less, the same minimum).
+#: An attempt with a limit of iterations is left where the violation is within the tolerance and does not halve in so many of them:
+#: rows contradict each other by less than the tolerance (pack-rig1-32 of MacMPEC: 4 NLPs, not 13, and the same minimum).
 CONTRADICTING = 10
 #: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
 #: one it came from an unbounded relaxation.
@@ -74,7 +74,6 @@ class BranchSolutions:
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
         self.at_once, self._known = at_once and self._c.eta.numel() > 0, {}
-        self._stalls = (Stall(CONTRADICTING, self._tolerances.feasibility), *[Stall(STALL)] * self.at_once)
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -105,7 +104,7 @@ class BranchSolutions:
         It has the decisions in force at the point, with which the LPEC found its direction.
         """
         equal = self._subsolves.in_force(point.w, point.equal)
-        solved, equal = self._with_all(self._subsolves.branch(point.w, zero, equal, 0.0, stalls=self._stalls), zero, equal)
+        solved, equal = self._with_all(self._subsolves.branch(point.w, zero, equal, 0.0, stalls=self._stalls()), zero, equal)
         return None if solved is None else self._point(self._measured(_Solution(nlp=solved, equal=equal)), np.inf, enough)
 
     def _with_all(self, solved, zero, equal, left=ASKED, **more):
@@ -128,13 +127,19 @@ class BranchSolutions:
         return Point(found.nlp, found.f, found.certificate, found.equal) if found.certificate.feasible else None
 
     def _solution(self, w, zero, duals, below, **more):
-        more |= {'steepest': STEEP * max(1.0, abs(below)), 'stalls': self._stalls}
+        more |= {'steepest': STEEP * max(1.0, abs(below)), 'stalls': self._stalls(**more)}
         found = self._solve(w, zero, duals, below, **more)
         if found.nlp is not None and not found.nlp.solved and more.get('max_iter') in MORE:
             # feasible, so the branch has a solution, but not at its minimum yet
-            again = self._solve(found.nlp.w, zero, found.nlp, below, **more | {'max_iter': MORE[more['max_iter']]})
+            more |= {'max_iter': MORE[more['max_iter']]}
+            again = self._solve(found.nlp.w, zero, found.nlp, below, **more | {'stalls': self._stalls(**more)})
             found = found if again.nlp is None else again
         return found if found.nlp is None else self._measured(found)
+
+    def _stalls(self, max_iter=None, **more):
+        """How the violation has to shrink; rows of the last attempt, and of a model without sides, may be ill-scaled."""
+        of_rows = [Stall(CONTRADICTING, self._tolerances.feasibility)] if self._c.pairs and max_iter is not None else []
+        return of_rows + [Stall(STALL)] * self.at_once
 
     def _measured(self, found):
         """The solution with its objective, and what that owes to violated rows; none where it shows no minimum."""

@@ -53,18 +53,16 @@ def test_decisions_that_a_solution_asks_for_are_added_some_times(asked, found):
 
 
 @pytest.mark.parametrize('at_once', [False, True])
-def test_only_a_branch_with_decisions_is_left_above_the_tolerance(at_once):
+@pytest.mark.parametrize(('pairs', 'max_iter', 'within'), [(1, 30, [TOLERANCES.feasibility]), (1, None, []), (0, 30, [])])
+def test_only_a_branch_with_decisions_is_left_above_the_tolerance(at_once, pairs, max_iter, within):
     limits = []
 
     def attempt(*args, stalls, **more):
         limits.extend(stalls)
 
-    subsolves = SimpleNamespace(
-        compiled=SimpleNamespace(eta=SimpleNamespace(numel=lambda: 1)),
-        tolerances=TOLERANCES,
-        attempt=attempt,
-        asked=lambda *_: True,
-    )
-    assert BranchSolutions(subsolves, at_once).certified(None, None, duals=True) is None
+    compiled = SimpleNamespace(eta=SimpleNamespace(numel=lambda: 1), pairs=pairs)
+    subsolves = SimpleNamespace(compiled=compiled, tolerances=TOLERANCES, attempt=attempt, asked=lambda *_: True)
+    more = {} if max_iter is None else {'max_iter': max_iter}
+    assert BranchSolutions(subsolves, at_once).certified(None, None, duals=True, **more) is None
     # another one comes back from violations of any size, as in pack-comp1p-32 of MacMPEC
-    assert [limit.below for limit in limits] == [TOLERANCES.feasibility, *[np.inf] * at_once]
+    assert [limit.below for limit in limits] == within + [np.inf] * at_once
