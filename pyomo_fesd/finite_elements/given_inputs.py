@@ -44,10 +44,11 @@ def read_fixed_inputs(block: Block, wrt: ContinuousSet, controls: Sequence) -> d
     states = (d.get_state_var() for d in derivatives(block, wrt))
     known = ComponentSet([*states, *(v for u in controls for v in (u, *u.values()))])
     variables = block.component_data_objects(Var, descend_into=(Block, Disjunct))
-    others = TimeIndex(wrt).families(v for v in variables if v not in known and v.parent_component() not in known)
-    found = {
-        strip_time(name): by_time for name, by_time in others.items() if len(by_time) > 1 and all(v.fixed for v in by_time.values())
-    }
+    others = [v for v in variables if v not in known and v.parent_component() not in known]
+    if not any(v.fixed for v in others):
+        return {}
+    families = TimeIndex(wrt).families(others).items()
+    found = {strip_time(name): by_time for name, by_time in families if len(by_time) > 1 and all(v.fixed for v in by_time.values())}
     for by_time in found.values():
         _refuse_different_values(by_time, wrt)
     return found
