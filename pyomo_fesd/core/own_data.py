@@ -86,7 +86,7 @@ def data_of(component) -> Iterable:
         return component.values()
     if not indices.isfinite():
         return list(data.values())
-    return [data[index] for index in indices] if len(data) == len(indices) else component.values()
+    return list(map(data.__getitem__, indices)) if len(data) == len(indices) else component.values()
 
 
 def entries_of(component) -> Iterable:
