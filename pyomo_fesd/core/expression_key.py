@@ -13,6 +13,11 @@ from pyomo.core.expr import numeric_expr as nodes
 from pyomo.core.expr import relational_expr as relations
 from pyomo.core.expr.visitor import ExpressionReplacementVisitor
 
+
+def no_detail(node) -> None:
+    """The detail of operations that their class and the number of their arguments describe."""
+
+
 #: Operations that are described by their class, the number of their arguments and a detail; subclasses are like them.
 DETAILS = {
     nodes.UnaryFunctionExpression: nodes.UnaryFunctionExpression.getname,
@@ -22,7 +27,7 @@ DETAILS = {
 } | dict.fromkeys(
     (nodes.SumExpression, nodes.ProductExpression, nodes.DivisionExpression, nodes.PowExpression, nodes.NegationExpression)
     + (relations.EqualityExpression,),
-    lambda node: None,
+    no_detail,
 )
 
 
@@ -94,7 +99,7 @@ def expression_key(expressions, kind) -> tuple:
         detail = detail_of(cls)
         if detail is not None:
             arguments = node.args
-            tokens += cls, len(arguments), detail(node)
+            tokens += cls, len(arguments), None if detail is no_detail else detail(node)
             waiting += arguments[::-1]
             continue
         number = numbers.get(id(node))

@@ -86,7 +86,7 @@ def data_of(component) -> Iterable:
         return component.values()
     if not indices.isfinite():
         return list(data.values())
-    return [data[index] for index in indices] if len(data) == len(indices) else component.values()
+    return list(map(data.__getitem__, indices)) if len(data) == len(indices) else component.values()
 
 
 def entries_of(component) -> Iterable:
@@ -95,8 +95,8 @@ def entries_of(component) -> Iterable:
     return component.items() if component.is_reference() else ((data._index, data) for data in data_of(component))
 
 
-def variables_below(block: Block, active: bool | None = None) -> Iterator:
+def variables_below(block: Block, active: bool | None = None, descend_into=Block) -> Iterator:
     """Yield the variables of a block and those outside of it that a Reference names; a whole model has no others than its own."""
     if block.model() is block:
-        return own_data(block, Var, Block, active)
-    return block.component_data_objects(Var, active=active, descend_into=Block)
+        return own_data(block, Var, descend_into, active)
+    return block.component_data_objects(Var, active=active, descend_into=descend_into)

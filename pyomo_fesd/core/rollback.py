@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import chain
 
-from pyomo.common.collections import ComponentMap
 from pyomo.core import Block, BooleanVar, Constraint, Expression, Objective, Param, Set, Var
 from pyomo.core.base.component import ActiveComponent
 from pyomo.core.base.indexed_component import ActiveIndexedComponent
@@ -87,8 +86,10 @@ def _by_type(blocks):
     """The components of the ``blocks`` by their type."""
     found = defaultdict(list)
     for block in blocks:
-        for component in block.component_map().values():
-            found[component.ctype].append(component)
+        # Pyomo's map takes longer to make than its own list to read, where a component that was deleted leaves None
+        for component, _ in block._decl_order:
+            if component is not None:
+                found[component.ctype].append(component)
     return found
 
 
@@ -129,10 +130,10 @@ def _remember_statements(components):
 
 
 def _remember_components(blocks):
-    names = ComponentMap((b, set(b.component_map())) for b in blocks)
+    names = [(b, set(b._decl)) for b in blocks]
 
     def restore():
-        for b, known in names.items():
+        for b, known in names:
             for name in set(b.component_map()) - known:
                 b.del_component(name)
 
@@ -142,12 +143,12 @@ def _remember_components(blocks):
 def _remember_indices(components):
     """Indices of components, and members of generated Sets; a Reference follows the components that it refers to."""
     indexed = (c for c in chain.from_iterable(components.values()) if c.is_indexed() and not c.is_reference())
-    indices = ComponentMap((c, set(c._data)) for c in indexed)
+    indices = [(c, set(c._data)) for c in indexed]
     sets = (s for s in components[Set] if is_generated(s) and isinstance(s, FiniteSetData))
     members = [(s, set(s)) for s in sets]
 
     def restore():
-        for component, known in indices.items():
+        for component, known in indices:
             for index in set(component._data) - known:
                 del component._data[index]
             component.__dict__.pop('_dae_missing_idx', None)
@@ -160,7 +161,7 @@ def _remember_indices(components):
 
 def _remember_active(components):
     whole = [c for c in chain.from_iterable(components.values()) if isinstance(c, ActiveComponent)]
-    data = (d for c in whole if isinstance(c, ActiveIndexedComponent) for d in c.values())
+    data = (d for c in whole if isinstance(c, ActiveIndexedComponent) for d in data_of(c))
     active = [(c, c.active) for c in chain(whole, data)]
     transformed = [(d, d._transformation_block) for d in _data(components, Disjunct)]
 

@@ -314,7 +314,7 @@ def _blocks_without_time(block, wrt):
     nameless = {id(d._autodisjuncts) for d in declared(block, DISJUNCTIONS)}
     for inner in declared(block, BLOCKS):
         if not is_indexed_by(inner, wrt) and id(inner) not in nameless:
-            for data in inner.values():
+            for data in data_of(inner):
                 yield from _blocks_without_time(data, wrt)
 
 

@@ -59,8 +59,9 @@ class DcsWriter(TimeWriter):
         model, times, defined = self.block.model(), TimeIndex(self.wrt), defined_variables(self.block)
         with_hysteresis = ComponentSet(_disjunctions(model, self.hysteresis))
         nesting = Nesting(model, times, with_hysteresis)
-        refuse_lists_of_times(_disjunctions(model, self.targets), times)
-        found = nesting.outermost(_disjunctions(model, self.targets), self.targets)
+        targeted = list(_disjunctions(model, self.targets))
+        refuse_lists_of_times(targeted, times)
+        found = nesting.outermost(targeted, self.targets)
         # where time is not discretised yet, the same Disjunctions follow at further times
         analyses, self._analyses = self._analyses or Analyses(), None
         reader = SystemReader(TimeVariables(model, self.wrt, self.defines), times, analyses)

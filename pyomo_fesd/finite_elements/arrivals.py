@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pyomo_fesd.core import Arrival, Element, MovingGrid, Option, Place, Toggle, homotopy_hints
-from pyomo_fesd.finite_elements.changes import PairsByPlace, pairs_of_events, switching_together
+from pyomo_fesd.finite_elements.changes import PairsByPlace, pairs_of_events
 
 #: Directions from the inside to the two ends.
 TO_FIRST, TO_LAST = -1, 1
@@ -44,9 +44,9 @@ class _End:
         return self.boundary - self.step
 
 
-def add_arrivals(moving: MovingGrid) -> None:
-    """Add the arrivals at both ends."""
-    places, arrivals, families = PairsByPlace(moving), homotopy_hints(moving.block).arrivals, _families(moving)
+def add_arrivals(moving: MovingGrid, names: dict[str, str]) -> None:
+    """Add the arrivals at both ends, of the families of conditions that ``switching_together`` returns by their ``names``."""
+    places, arrivals, families = PairsByPlace(moving), homotopy_hints(moving.block).arrivals, _families(moving, names)
     elements, pairs = moving.grid.elements, _pairs_of_elements(moving)
     for end in (_End(TO_FIRST, elements[0], 0), _End(TO_LAST, elements[-1], len(elements))):
         row, contacts = _row(moving, places, end), _contacts(moving, end)
@@ -63,9 +63,9 @@ def add_arrivals(moving: MovingGrid) -> None:
             arrivals += [Arrival(row, some, opposite=opposite) for some in _toggles(families, pairs, *ends) if some]
 
 
-def _families(moving):
+def _families(moving, names):
     """The time complementarities that switch together."""
-    names, found = switching_together(moving), defaultdict(list)
+    found = defaultdict(list)
     for condition in moving.complementarities:
         found[names[condition.name]].append(condition)
     return list(found.values())

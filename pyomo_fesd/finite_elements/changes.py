@@ -18,9 +18,9 @@ from pyomo_fesd.finite_elements.algebraic_graph import rule_of
 from pyomo_fesd.finite_elements.continuity import inner_label
 
 
-def changes_at_boundaries(moving: MovingGrid) -> list[dict[str, Change]]:
-    """Return the changes at each inner boundary, by family (``switching_together``)."""
-    places, families = PairsByPlace(moving), switching_together(moving)
+def changes_at_boundaries(moving: MovingGrid, families: dict[str, str]) -> list[dict[str, Change]]:
+    """Return the changes at each inner boundary, by family, of the ``families`` that ``switching_together`` returns."""
+    places = PairsByPlace(moving)
     return [dict(_changes(places, before, families)) for before in moving.grid.elements[:-1]]
 
 

@@ -14,13 +14,12 @@ from collections.abc import Iterator
 from itertools import chain
 
 from pyomo_fesd.core import Change, Coincidence, MovingGrid, homotopy_hints
-from pyomo_fesd.finite_elements.changes import switching_together
 from pyomo_fesd.finite_elements.hysteresis import LEFT, RIGHT
 
 
-def add_coincidences(moving: MovingGrid, at_boundaries: list[dict[str, Change]]) -> None:
-    """Add the coincidences at every inner boundary, of the changes ``at_boundaries``."""
-    families, found = switching_together(moving), homotopy_hints(moving.block).coincidences
+def add_coincidences(moving: MovingGrid, at_boundaries: list[dict[str, Change]], families: dict[str, str]) -> None:
+    """Add the coincidences at every inner boundary, of the changes ``at_boundaries`` of ``families`` that switch together."""
+    found = homotopy_hints(moving.block).coincidences
     names = _jumping_between_stages(moving)
     jumping = {family for name, family in families.items() if name in names}
     several = len(set(families.values())) > 1

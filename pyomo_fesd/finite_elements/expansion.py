@@ -40,6 +40,7 @@ from pyomo_fesd.core import (
     label_decimals,
     make_data,
     own_components,
+    own_data,
     paused_collection,
     withheld_messages,
 )
@@ -213,6 +214,8 @@ def _hybrid_over_time(block, wrt):
 
 def _switched_off(block, wrt):
     """Type and name of hybrid components that are off at every present time, by the user's will and not by a transformation."""
+    if all(map(_in_use, own_data(block, HYBRID, PLACES))):
+        return set()
     excluded = all_switched_systems(block.model()).excluded
     found = _hybrid_over_time(block, wrt)
     return {(ctype, name) for ctype, name, datas in found if not any(c in excluded or _in_use(c) for c in datas)}

@@ -9,6 +9,7 @@ from operator import itemgetter
 
 from pyomo.common.numeric_types import native_types
 from pyomo.core import Block, Constraint, value
+from pyomo.core.base.var import VarData
 from pyomo.core.expr.relational_expr import RelationalExpression
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
@@ -116,6 +117,9 @@ def _leaves(stated):
     found, waiting = [], list(stated)[::-1]
     while waiting:
         node = waiting.pop()
+        if node.__class__ is VarData:
+            # half of all nodes
+            continue
         if node.__class__ not in native_types:
             if node.is_expression_type():
                 waiting.extend(node.args[::-1])

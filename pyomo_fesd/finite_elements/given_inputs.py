@@ -13,12 +13,12 @@ import logging
 from collections.abc import Sequence
 
 from pyomo.common.collections import ComponentSet
-from pyomo.core import Block, Param, Var, value
+from pyomo.core import Block, Param, value
 from pyomo.core.base.param import IndexedParam
 from pyomo.dae import ContinuousSet
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core import FesdError, TimeIndex, derivatives, is_indexed_by, own_components, strip_time
+from pyomo_fesd.core import FesdError, TimeIndex, derivatives, is_indexed_by, own_components, strip_time, variables_below
 
 logger = logging.getLogger('pyomo_fesd')
 
@@ -43,11 +43,12 @@ def read_fixed_inputs(block: Block, wrt: ContinuousSet, controls: Sequence) -> d
     """
     states = (d.get_state_var() for d in derivatives(block, wrt))
     known = ComponentSet([*states, *(v for u in controls for v in (u, *u.values()))])
-    variables = block.component_data_objects(Var, descend_into=(Block, Disjunct))
-    others = TimeIndex(wrt).families(v for v in variables if v not in known and v.parent_component() not in known)
-    found = {
-        strip_time(name): by_time for name, by_time in others.items() if len(by_time) > 1 and all(v.fixed for v in by_time.values())
-    }
+    variables = variables_below(block, descend_into=PLACES)
+    others = [v for v in variables if v not in known and v.parent_component() not in known]
+    if not any(v.fixed for v in others):
+        return {}
+    families = TimeIndex(wrt).families(others).items()
+    found = {strip_time(name): by_time for name, by_time in families if len(by_time) > 1 and all(v.fixed for v in by_time.values())}
     for by_time in found.values():
         _refuse_different_values(by_time, wrt)
     return found

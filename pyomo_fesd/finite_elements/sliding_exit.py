@@ -39,17 +39,17 @@ def add_sliding_exits(moving: MovingGrid) -> None:
     block.slope = Expression(block.condition, block.element)
     block.below = Expression(block.condition, block.element)
     block.exit = Complementarity(block.condition, block.element)
-    inner = list(moving.grid.inner_boundaries())
+    inner, hints = list(moving.grid.inner_boundaries()), homotopy_hints(block).branch_constraints
     for condition in moving.complementarities:
         if condition.continuous == (False, True) and not condition.follows:
             for e, f in inner:
                 if len(condition.points(e)) == len(tau) == len(condition.points(f)) and f.left in condition.sides:
-                    _add_exit_condition(block, condition, e, f, slope, end)
+                    hints.append(_exit_condition(block, condition, e, f, slope, end))
     block.arrival.deactivate()
 
 
-def _add_exit_condition(block, condition, e, f, slope, end):
-    """Add the exit of one time complementarity at the boundary between elements e and f."""
+def _exit_condition(block, condition, e, f, slope, end):
+    """Add the exit of one time complementarity at the boundary between elements e and f; return it for the homotopy."""
     index, values = (condition.name, e.n), [condition.sides[t][0] for t in e.points]
     G = sum_of([weight * value for weight, value in zip(end, values) if weight])
     H = [condition.starts.get(f.n, condition.sides[f.left])[1], *(condition.sides[t][1] for t in f.points)]
@@ -60,7 +60,7 @@ def _add_exit_condition(block, condition, e, f, slope, end):
     leaves = block.activity[index] * (1 - block.activity[condition.name, f.n])
     arrival = insert(block.arrival, index, G == 0)
     pair = insert(block.exit, index, complements(G**2 >= 0, leaves * flat >= 0))
-    homotopy_hints(block).branch_constraints.append(BranchConstraint(pair, arrival, tentative=True))
+    return BranchConstraint(pair, arrival, tentative=True)
 
 
 def _relative_slope(weights, values):

@@ -35,7 +35,7 @@ from pyomo_fesd.core import (
 )
 from pyomo_fesd.finite_elements.arrivals import add_arrivals
 from pyomo_fesd.finite_elements.chain_of_elements import add_chain
-from pyomo_fesd.finite_elements.changes import changes_at_boundaries
+from pyomo_fesd.finite_elements.changes import changes_at_boundaries, switching_together
 from pyomo_fesd.finite_elements.coincidences import add_coincidences
 from pyomo_fesd.finite_elements.contacts import read_contacts, with_departures, without_left_slip
 from pyomo_fesd.finite_elements.continuity import check_continuous, inner_label, read_continuity
@@ -157,15 +157,16 @@ def _laid(instance, config):
         present = discretised(wrt)
         moving = _add_grid(instance, wrt, config)
         integrals = _rebuild_integrals(instance, moving)
-        switching = _read_switching(instance, wrt, config)
+        held = _held(config, wrt)
+        switching = _read_switching(instance, wrt, held)
         if present and switching:
             warn_of_order_one(moving)
         _warn(expressions_over_time(instance, moving, integrals, switching.laws()), moving)
-        continuity = _read_continuity(instance, moving, switching, config)
+        continuity = _read_continuity(instance, moving, switching, config, held)
         complementarities = _read_complementarities(moving, switching, continuity)
         hold_controls(moving, config.piecewise_constant)
         multiply_derivatives(moving)
-        _add_switching(moving, switching, complementarities, continuity, config)
+        _add_switching(moving, switching, complementarities, continuity, config, held)
         if not switching:
             moving.r.fix(1)
         yield moving, switching, config
@@ -236,10 +237,10 @@ def _rebuild_integrals(instance, moving):
     return found
 
 
-def _read_switching(instance, wrt, config):
+def _read_switching(instance, wrt, held):
     conditions, model = conditions_over_time(instance, TimeIndex(wrt)), instance.model()
     switching = _Switching(*conditions, read_hysteresis(model, wrt), read_jumps(model, wrt), read_contacts(model, wrt))
-    check_guards(switching.jumps, _held(config, wrt))
+    check_guards(switching.jumps, held)
     if not switching:
         _refuse_disjunctions(instance, TimeIndex(wrt))
     return switching
@@ -266,14 +267,14 @@ def _refuse_disjunctions(instance, times):
             )
 
 
-def _read_continuity(instance, moving, switching, config):
+def _read_continuity(instance, moving, switching, config, held):
     """Continuity at the inner labels of the conditions; by the equations there if they can matter."""
     conditions, grid = list(switching.by_time()), moving.grid
     labels = {inner_label(by_time, moving.wrt) for by_time in conditions}
     written = not all(map(_is_generated_pair, conditions))
     trace = written or (bool(conditions) and (len(grid.control_stages) > 1 or not grid.right_is_collocated))
     times = TimeIndex(moving.wrt)
-    return read_continuity(instance.model(), times, labels, _held(config, moving.wrt), config.continuous, trace)
+    return read_continuity(instance.model(), times, labels, held, config.continuous, trace)
 
 
 def _is_generated_pair(by_time):
@@ -291,10 +292,10 @@ def _read_complementarities(moving, switching, continuity):
     return found
 
 
-def _add_switching(moving, switching, complementarities, continuity, config):
+def _add_switching(moving, switching, complementarities, continuity, config, held):
     """Write the pairs of all that switches."""
     add_state_jumps(moving, switching.jumps, switching.contacts)
-    limits = RightLimits(moving, continuity, [*_held(config, moving.wrt), *config.continuous])
+    limits = RightLimits(moving, continuity, [*held, *config.continuous])
     complementarities = list(map(limits.with_starts, complementarities))
     add_hysteresis(moving, switching.modes, limits)
     complementarities = with_mode_limits(moving, complementarities, continuity, config.piecewise_constant)
@@ -313,10 +314,11 @@ def _relate_lengths(moving, config):
 
 def _describe_boundaries(moving):
     """Tell the solver what may change at the boundaries."""
-    changes = changes_at_boundaries(moving)
+    families = switching_together(moving)
+    changes = changes_at_boundaries(moving, families)
     add_neighbour_branches(moving, changes)
-    add_coincidences(moving, changes)
-    add_arrivals(moving)
+    add_coincidences(moving, changes, families)
+    add_arrivals(moving, families)
 
 
 def _relate_variables(moving, switching):

@@ -13,6 +13,8 @@ Leaves: the components of the rules and the generated constraints; the functions
 Does not apply: where neither the component nor the arguments are over time.
 """
 
+from itertools import chain
+
 from pyomo.common.numeric_types import native_types
 from pyomo.contrib.piecewise import PiecewiseLinearExpression, PiecewiseLinearFunction
 from pyomo.core import Block, Constraint, Objective
@@ -31,7 +33,7 @@ from pyomo_fesd.core import (
     discretised,
     is_discretisation_equation,
     is_generated,
-    own_data,
+    own_components,
 )
 from pyomo_fesd.dcs.piecewise import expr_if, multivariate, univariate
 from pyomo_fesd.dcs.piecewise.replaced_constraints import deactivate, replace_constraint
@@ -144,17 +146,22 @@ def may_contain_functions(disjunct) -> bool:
 
 def _refuse_written_by_pyomo(block, times):
     """Refuse Pyomo's own Disjunctions of a piecewise function: their regions do not cover points outside its domain."""
-    for disjunction in own_data(block, Disjunction, Block, active=True):
-        above = disjunction.parent_block() if disjunction.active else None
-        while above is not None and not above.local_name.startswith(WRITTEN_BY_PYOMO):
-            above = above.parent_block()
-        if above is not None and any(times.time(v) is not None for v in _disjunction_variables(disjunction)):
+    written = (c for c in own_components(block, Disjunction, Block, active=True) if _is_written_by_pyomo(c))
+    for disjunction in chain.from_iterable(map(_active, written)):
+        if any(times.time(v) is not None for v in _disjunction_variables(disjunction)):
             raise FesdError(
                 disjunction,
                 "a transformation of contrib.piecewise has written a PiecewiseLinearFunction over time as this Disjunction, whose "
                 "regions do not fill the state space",
                 "leave that transformation out: fesd.dcs takes the PiecewiseLinearFunction itself",
             )
+
+
+def _is_written_by_pyomo(component):
+    above = component.parent_block()
+    while above is not None and not above.local_name.startswith(WRITTEN_BY_PYOMO):
+        above = above.parent_block()
+    return above is not None
 
 
 def _disjunction_variables(disjunction):

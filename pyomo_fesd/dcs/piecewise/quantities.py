@@ -1,5 +1,7 @@
 """Compare quantities, the arguments of piecewise functions, by their values at a few random points."""
 
+from functools import cached_property
+
 import numpy as np
 from pyomo.common.collections import ComponentMap
 
@@ -18,9 +20,13 @@ class Quantities:
     """Values of expressions at the same few random points around the present values of their variables."""
 
     def __init__(self):
-        self._random = np.random.default_rng(1)
         self._points = ComponentMap()
         self._values = {}
+
+    @cached_property
+    def _random(self):
+        # most models have no piecewise functions, and Numpy takes long to make a generator
+        return np.random.default_rng(1)
 
     def affine(self, q, known):
         """Return (f, d) with q = f known + d, f not 0; None if there is none."""

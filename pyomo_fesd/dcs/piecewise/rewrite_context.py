@@ -1,5 +1,7 @@
 """The view that the rules for piecewise functions have of a model: one time of one component."""
 
+from functools import cached_property
+
 from pyomo.core import Constraint
 from pyomo.core.expr import identify_variables
 
@@ -26,15 +28,18 @@ class SharedContext:
     breakpoints : Breakpoints
     interpolations : GeneratedBlocks
         of functions of several arguments
-    variables : TimeVariables
     """
 
     def __init__(self, instance, times, undo):
-        self.times, self.undo = times, undo
+        self.times, self.undo, self._model = times, undo, instance.model()
         self.breakpoints = Breakpoints(GeneratedBlocks(instance, 'surfaces', times, undo))
         self.interpolations = GeneratedBlocks(instance, 'meshes', times, undo)
-        self.variables = TimeVariables(instance.model(), times.wrt)
         self._made = {}
+
+    @cached_property
+    def variables(self):
+        """The derivatives and states; read where a piecewise function has a condition."""
+        return TimeVariables(self._model, self.times.wrt)
 
     def once(self, make, key, *others):
         """Return ``make(key, *others)``, made once for each key."""

@@ -110,7 +110,7 @@ class Nesting:
 
     def __init__(self, model, times, with_hysteresis=()):
         self._times, self._with_hysteresis = times, with_hysteresis
-        self._inside, self._hosts = ComponentMap(), ComponentMap()
+        self._inside, self._hosts, self._around = ComponentMap(), ComponentMap(), {}
         found = own_data(model, Disjunction, (Block, Disjunct), active=True)
         for disjunction in (d for d in found if d.active):
             host = self._hosts[disjunction] = self._host(disjunction)
@@ -135,7 +135,11 @@ class Nesting:
 
     def _enclosing(self, component):
         """The innermost disjunct over time around a component, or None."""
-        disjunct = enclosing_disjunct(component)
+        # the data of one component lie in the same block
+        owner = component.parent_component()
+        if id(owner) not in self._around:
+            self._around[id(owner)] = enclosing_disjunct(owner)
+        disjunct = self._around[id(owner)]
         return disjunct if disjunct is not None and self._times.time(disjunct) is not None else None
 
     def outermost(self, disjunctions, targets):

@@ -248,9 +248,12 @@ class SystemReader:
         components = [part.parent_component() for part in stated.parts if hasattr(part, 'parent_component')]
         if components and all(id(c) in self._own for c in components):
             return
-        for mode, cons in zip([*modes, *modes], [*stated.equalities, *stated.inequalities]):
-            mentioned = (v for con in cons for v in identify_variables(con.body))
-            refuse_foreign(mentioned, tree.disjunction.model(), mode)
+        model = tree.disjunction.model()
+        # the parts are all that the constraints mention; where they belong to the model, the constraints need no walk
+        if not components or any(c.model() is not model for c in components):
+            for mode, cons in zip([*modes, *modes], [*stated.equalities, *stated.inequalities]):
+                mentioned = (v for con in cons for v in identify_variables(con.body))
+                refuse_foreign(mentioned, model, mode)
         self._own |= {id(c): c for c in components}
 
 
