@@ -136,15 +136,16 @@ class Subsolves:
         """The ``Verdict`` of a kind of insertion; not decided where its LPECs would take long: there may be many orders."""
         equal = self._c.evaluate(point.w).eta > self.tolerances.eta if point.equal is None else self.in_force(point.w, point.equal)
         with self._timed('lpec') as started:
-            verdict = self._judge(kind, self._seconds(ORDER_TIME)).verdict(point.w, sets, equal, *order)
+            verdict = self._insertions(kind, self._seconds(ORDER_TIME)).verdict(point.w, sets, equal, *order)
         self._log('order', 0.0, point.w, 0, verdict.value, started)
         return verdict
 
     def at_limit(self, w, zero, extents, size):
         """``w`` with the values that parts of extent 0 have as they grow; None without any."""
-        return self._judge(Insertions).at_limit(w, zero, extents, size)
+        return self._insertions(Insertions).at_limit(w, zero, extents, size)
 
-    def _judge(self, kind, seconds=None):
+    def _insertions(self, kind, seconds=None):
+        """A kind of insertion, whose LPECs have so many seconds from now on; None: as they are."""
         return kind(self._c, self._sides, self.parts, self._lpec.at_most(seconds), self.tolerances)
 
     def suggestion(self, w, sets, Delta):

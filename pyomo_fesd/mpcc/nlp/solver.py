@@ -164,7 +164,7 @@ class NlpSolver(ABC):
             iterations that this call may use, where they can be counted
         steepest : float
             limit of the multipliers of rows, where the solver shows them on its way: with larger ones, it ends as ``DIVERGING``
-        stalls : tuple of Stall
+        stalls : sequence of Stall
             how the largest violation of a row has to shrink, where the solver shows it; if it does not, the solve ends as
             ``STALLED``
 
