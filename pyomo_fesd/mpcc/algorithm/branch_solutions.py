@@ -31,9 +31,9 @@ STEEP = 1e3
 #: A branch with decisions of its sides is left where its violation does not halve in so many iterations: in two runs (a ball and
 #: discs) that would have saved a third of all iterations, and stopped 8 NLPs that ended solved.
 STALL = 50
-#: An attempt with a limit of iterations, or the one from afar after it, is left where the violation is within the tolerance and does
-#: not halve in so many: rows contradict each other by less than the tolerance (pack-rig1-32 of MacMPEC: 4 NLPs, not 13, and the same
-#: minimum).
+#: An attempt with a limit of iterations, or the one from afar after it, is left where the violation is within the tolerance and
+#: does not halve in so many: rows contradict each other by less than the tolerance (pack-rig1-32 of MacMPEC: 4 NLPs, not 13, and
+#: the same minimum).
 CONTRADICTING = 10
 #: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
 #: one it came from an unbounded relaxation.
