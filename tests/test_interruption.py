@@ -1,12 +1,14 @@
 """Ctrl-C at random times: the model is as it was, no folder is left behind, and nothing turns it into another error."""
 
 import gc
+import logging
 import os
 import random
 import signal
 import sys
 import tempfile
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pyomo.environ as pyo
 import pytest
@@ -114,6 +116,30 @@ def test_a_transformation_is_undone(work, build, number):
         assert seen(m) in (before, done)
     # pressed in the last lines, when everything is written
     assert finished <= 1 + number // 10
+
+
+class PressInLogging(Press):
+    """One that counts and presses at the lines of logging only, some of which hold the lock that all loggers share."""
+
+    def __call__(self, frame, event, argument):
+        return super().__call__(frame, event, argument) if frame.f_code.co_filename == logging.__file__ else self
+
+
+def is_free(lock):
+    """Whether another thread can take a lock."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(lambda: lock.acquire(timeout=1.0) and not lock.release()).result()
+
+
+def test_the_lock_of_logging_is_left(number=60):
+    # in getLogger() and others of Python 3.11 it is taken a line before their try
+    lines, draw = PressInLogging(0), random.Random(0)
+    lines.during(finite_elements, dcs(signum()))
+    for _ in range(number):
+        press = PressInLogging(draw.randint(1, lines.count))
+        answer = press.during(finite_elements, dcs(signum()))
+        assert press.pressed and isinstance(answer, KeyboardInterrupt)
+        assert is_free(logging._lock)
 
 
 def components(m):

@@ -37,9 +37,7 @@ def run(step, number):
 def at_once(work, numbers):
     """What ``work`` returns for each number, with threads that take turns often.
 
-    Not more often: at 1e-5 s one run of the gate in about a hundred hung inside of CPython 3.11, in a thread that waits for
-    another to take the interpreter's lock (a wakeup that glibc before 2.41 may lose, its bug 25847).  Without our lock on
-    transformations, 1 to 3 of 12 rounds fail with either interval.
+    Without our lock on transformations, 1 to 3 of 12 rounds fail with this interval, and with 1e-5 s.
     """
     interval = sys.getswitchinterval()
     sys.setswitchinterval(5e-4)

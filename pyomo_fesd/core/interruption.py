@@ -1,6 +1,7 @@
 """Ctrl-C: at once where nothing is lost by it, and after the body where something would be left half done."""
 
 import contextlib
+import logging
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -54,8 +55,8 @@ class DeferredInterrupt:
         self.pressed = True
 
     def _raise(self, number, frame):
-        if _is_entry(frame):
-            # a context of a generator that is interrupted there would never be left: the end of the body answers
+        if _may_leave_open(frame):
+            # a context of a generator, or a lock, that is interrupted there would never be left: the end of the body answers
             self.pressed = True
             return
         try:
@@ -95,10 +96,10 @@ class DeferredInterrupt:
         self._answer(self._handler)
 
 
-def _is_entry(frame):
-    """Whether a context is just being entered or left by contextlib; a tracer may lie between."""
+def _may_leave_open(frame):
+    """Whether contextlib enters or leaves a context, or logging its lock, which all threads share; a tracer may lie between."""
     for _ in range(NEAR):
-        if frame is not None and frame.f_code.co_filename == contextlib.__file__:
+        if frame is not None and frame.f_code.co_filename in (contextlib.__file__, logging.__file__):
             return True
         frame = frame and frame.f_back
     return False
