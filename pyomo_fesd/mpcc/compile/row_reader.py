@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pyomo.common.errors import InfeasibleConstraintException, InvalidValueError
 from pyomo.common.numeric_types import native_numeric_types
 from pyomo.core import Block, Constraint, SortComponents
-from pyomo.core.expr import NegationExpression, ProductExpression, SumExpression
+from pyomo.core.expr import LinearExpression, NegationExpression, ProductExpression, SumExpression
 from pyomo.repn.ampl import AMPLRepnVisitor, evaluate_ampl_nl_expression
 
 from pyomo_fesd.core import withheld_messages
@@ -22,6 +22,8 @@ from pyomo_fesd.mpcc.compile.unreadable import refuse_dropped_terms, without_val
 
 #: A constraint without variables may miss its bounds by this much, as in Pyomo's NL writer.
 TOLERANCE = 1e-8
+#: Terms of a sum that are multiplied by the sum's factor one by one: casadi needs a pass over all of them for each variable otherwise.
+MANY = 8
 
 
 @dataclass(eq=False)
@@ -153,7 +155,22 @@ def _terms(expr):
             waiting.append((term.arg(0), -factor))
         elif kind is ProductExpression and term.arg(0).__class__ in native_numeric_types:
             waiting.append((term.arg(1), factor * term.arg(0)))
+        elif kind is ProductExpression and (products := _products(*term.args)):
+            waiting += [(product, factor) for product in reversed(products)]
         elif hasattr(term, 'is_named_expression_type') and term.is_named_expression_type():
             waiting.append((term.expr, factor))
         else:
             yield term, factor
+
+
+def _products(one, other):
+    """Terms of ``x[i] * sum(Q[i, j] * x[j] for j)``, a row of a quadratic form; none of other products."""
+    if one.__class__ is LinearExpression:
+        one, other = other, one
+    if other.__class__ is not LinearExpression or other.nargs() < MANY or not _is_variable(one):
+        return []
+    return [one * term for term in other.args]
+
+
+def _is_variable(expr):
+    return expr.__class__ not in native_numeric_types and expr.is_variable_type()

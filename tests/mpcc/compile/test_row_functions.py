@@ -68,8 +68,10 @@ def alike(seed):
     m.rows = pyo.Constraint(m.i, rule=lambda m, i: number() * pick() * pick() ** 1.3 + pick() / (1 + pick()) <= number() + 3)
     m.nested = pyo.Constraint(m.i, rule=lambda m, i: m.outer[i] * pick() - number() * m.inner[int(random.integers(5))] >= number())
     m.linear = pyo.Constraint(m.i, rule=lambda m, i: number() * pick() + number() * pick() + number() == number())
+    Q = random.normal(size=(5, 10))
+    form = sum(m.x[i] * pyo.quicksum(Q[i, j] * m.x[j] for j in range(10)) * random.choice([1, 0.7]) for i in m.i)
     m.f = pyo.Objective(
-        expr=sum(number() * (pick() - number()) ** 2 * pick() for _ in m.i) - 3 * m.outer[0],
+        expr=sum(number() * (pick() - number()) ** 2 * pick() for _ in m.i) - 3 * m.outer[0] + form,
         sense=random.choice([pyo.minimize, pyo.maximize]),
     )
     m.pair = Complementarity(m.i, rule=lambda m, i: complements(pick() ** 2 + number() >= 0, pick() * pick() - number() >= 0))
@@ -146,6 +148,22 @@ def test_rows_of_one_form_are_one_class():
     m.row = pyo.Constraint(pyo.RangeSet(0, 39), rule=lambda m, i: m.data[i] * pyo.exp(m.x[i]) * m.x[i + 1] - m.x[i] == 0.1 * i)
     (found,) = compiled(m)._functions.rows.functions.classes
     assert found.columns.shape == (2, 40)
+
+
+@pytest.mark.parametrize('variable_first', [True, False])
+def test_a_quadratic_form_has_a_class_for_squares_and_one_for_products(variable_first):
+    n, Q = 30, np.random.default_rng(0).normal(size=(30, 30)) / 10
+    m = pyo.ConcreteModel()
+    m.x = pyo.Var(range(n), initialize=1.0)
+    sums = [pyo.quicksum(Q[i, j] * m.x[j] for j in range(n)) for i in range(n)]
+    m.f = pyo.Objective(expr=sum(m.x[i] * sums[i] if variable_first else sums[i] * m.x[i] for i in range(n)))
+    m.row = pyo.Constraint(expr=m.x[0] ** 2 >= 0)
+    c = compiled(m)
+    assert sorted(k.columns.shape for k in c._functions.cost.functions.classes) == [(1, n), (2, n * (n - 1))]
+    x = np.random.default_rng(1).normal(size=n)
+    at = dict(zip((v.index() for v in c.variables), x))
+    x_of_model = np.array([at[i] for i in range(n)])
+    assert c.evaluate(x).f == pytest.approx(x_of_model @ Q @ x_of_model, rel=1e-12)
 
 
 def test_a_long_chain_of_expressions_is_evaluated_once():
