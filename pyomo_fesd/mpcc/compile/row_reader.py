@@ -22,7 +22,7 @@ from pyomo_fesd.mpcc.compile.unreadable import refuse_dropped_terms, without_val
 
 #: A constraint without variables may miss its bounds by this much, as in Pyomo's NL writer.
 TOLERANCE = 1e-8
-#: Terms of a sum that are multiplied by the sum's factor one by one: casadi needs a pass over all of them for each variable otherwise.
+#: Terms of a sum that its factor multiplies one by one: for each variable, casadi needs a pass over all of them otherwise.
 MANY = 8
 
 
