@@ -13,6 +13,7 @@ import numpy as np
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Point, Stop
 from pyomo_fesd.mpcc.algorithm.subsolves import LEFT
 from pyomo_fesd.mpcc.nlp import NlpResult, Stall
+from pyomo_fesd.mpcc.subproblems import Stationarity
 
 #: Iterations of the first and of the second attempt; and how many more if they only lead to a feasible point (None: no limit).
 FIRST, SECOND = 30, 100
@@ -35,6 +36,11 @@ STALL = 50
 #: does not halve in so many: rows contradict each other by less than the tolerance (pack-rig1-32 of MacMPEC: 4 NLPs, not 13, and
 #: the same minimum).
 CONTRADICTING = 10
+#: Two solutions are one if their values, relative or absolute, and their objectives, relative, differ by less: branches that meet
+#: there lead to it again and again, and a certificate may take longer than all their NLPs.
+SAME_VALUE, SAME_OBJECTIVE = 1e-5, 1e-9
+#: Round-off of an NLP's end shows no descent in an LPEC that is as large as this.
+CLEAR_DESCENT = 1e-4
 #: A feasible point with variables beyond this and an objective below that of the start shows an unbounded problem; with another
 #: one it came from an unbounded relaxation.
 UNBOUNDED = 1e15
@@ -74,7 +80,7 @@ class BranchSolutions:
 
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
-        self.at_once, self._known = at_once and self._c.eta.numel() > 0, {}
+        self.at_once, self._known, self._certified = at_once and self._c.eta.numel() > 0, {}, []
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -124,8 +130,20 @@ class BranchSolutions:
         if found.nlp is None or _is_clearly_above(found.f, below) or found.f > enough:
             return None
         if found.certificate is None:
-            found.certificate = self._subsolves.certify(found.nlp, found.equal)
+            found = self._certified_before(found) or self._certify(found)
         return Point(found.nlp, found.f, found.certificate, found.equal) if found.certificate.feasible else None
+
+    def _certify(self, found):
+        found.certificate = self._subsolves.certify(found.nlp, found.equal)
+        self._certified.append(found)
+        return found
+
+    def _certified_before(self, found):
+        """The same solution with its certificate, from another branch; None if it is new.
+
+        One of which the LPEC found a descent that may be round-off is certified anew.
+        """
+        return next((one for one in self._certified if _is_clear(one.certificate) and _is_same(one, found)), None)
 
     def _solution(self, w, zero, duals, below, **more):
         more |= {'steepest': STEEP * max(1.0, abs(below)), 'stalls': self._stalls(**more)}
@@ -220,6 +238,18 @@ class BranchSolutions:
             equal = equal & ~self._c.tentative
             solved = solve(w, zero, equal, 0.0, **more)
         return solved, equal
+
+
+def _is_clear(certificate):
+    """Whether the LPEC would say the same of values that differ by round-off."""
+    return certificate.grade is not Stationarity.DESCENT or certificate.lpec.descent > CLEAR_DESCENT
+
+
+def _is_same(one, other):
+    if not (one.nlp.solved and other.nlp.solved) or abs(one.f - other.f) > SAME_OBJECTIVE * max(1.0, abs(one.f)):
+        return False
+    close = np.abs(one.nlp.w - other.nlp.w) <= SAME_VALUE * np.maximum(1.0, np.abs(one.nlp.w))
+    return bool(close.all()) and np.array_equal(one.equal, other.equal)
 
 
 def _is_clearly_above(f, below):

@@ -41,7 +41,7 @@ class Coincidences:
     def __init__(self, subsolves, branches):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._branches, self._settled = subsolves, branches, None
-        self._orders, self._short = Orders(subsolves), ShortPlaces(branches)
+        self._orders, self._short, self._tried = Orders(subsolves), ShortPlaces(branches), {}
 
     def settle(self):
         """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
@@ -54,7 +54,7 @@ class Coincidences:
             # until all orders are settled any certified point is better
             self.run.point = replace(before, certificate=replace(before.certificate, grade=Stationarity.OPEN))
             self._short.leave_out(before)
-            found = self._outcome(before)
+            found = self._outcome_once(before)
             if found is OPEN and self._takes_fewer_short(before):
                 continue
             if found is SETTLED:
@@ -115,6 +115,16 @@ class Coincidences:
         if found is SETTLED:
             return certificate
         return replace(certificate, grade=Stationarity.OPEN if found is OPEN else Stationarity.DESCENT)
+
+    def _outcome_once(self, point):
+        """The outcome of a point; that of before where it led nowhere: several branches and starts have the same solution."""
+        key = point.f, point.w.tobytes()
+        if key not in self._tried:
+            found = self._outcome(point)
+            if not isinstance(found, str):
+                return found
+            self._tried[key] = found
+        return self._tried[key]
 
     def _outcome(self, point, goes_on=True):
         """A better point; or whether all orders are settled.

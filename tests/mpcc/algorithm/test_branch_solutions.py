@@ -1,4 +1,4 @@
-"""What an objective owes to violated rows is no progress."""
+"""What an objective owes to violated rows is no progress; decisions and limits of a branch; a solution is certified once."""
 
 from types import SimpleNamespace
 
@@ -8,9 +8,10 @@ import pytest
 from pyomo.common.timing import HierarchicalTimer
 from pyomo.mpec import Complementarity, complements
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import BranchSolutions
+from pyomo_fesd.mpcc.algorithm.branch_solutions import BranchSolutions, _Solution
 from pyomo_fesd.mpcc.compile.compile import compile_mpcc
 from pyomo_fesd.mpcc.compile.read_mpcc import read_mpcc
+from pyomo_fesd.mpcc.subproblems import Stationarity
 
 TOLERANCES = SimpleNamespace(feasibility=1e-6)
 
@@ -66,3 +67,33 @@ def test_only_a_branch_with_decisions_is_left_above_the_tolerance(at_once, pairs
     assert BranchSolutions(subsolves, at_once).certified(None, None, duals=True, **more) is None
     # another one comes back from violations of any size, as in pack-comp1p-32 of MacMPEC
     assert [limit.below for limit in limits] == within + [np.inf] * at_once
+
+
+SOLUTION = {'w': np.array([1.0, 50.0]), 'f': 2.0, 'solved': True, 'equal': np.array([True])}
+SOLUTION |= {'grade': Stationarity.B, 'descent': 0.0}
+
+
+@pytest.mark.parametrize(
+    ('first', 'then', 'is_new'),
+    [
+        ({}, {'w': SOLUTION['w'] * (1 + 1e-6)}, False),
+        ({'grade': Stationarity.LIMITED}, {}, False),
+        ({'grade': Stationarity.DESCENT, 'descent': 1.0}, {}, False),
+        ({'grade': Stationarity.DESCENT, 'descent': 1e-6}, {}, True),
+        ({}, {'w': SOLUTION['w'] * (1 + 1e-4)}, True),
+        ({}, {'f': 2.0 + 1e-6}, True),
+        ({}, {'solved': False}, True),
+        ({}, {'equal': np.array([False])}, True),
+    ],
+)
+def test_a_solution_that_another_branch_has_too_is_certified_once(first, then, is_new):
+    def solution(w, f, solved, equal, grade, descent):
+        certificates.append(SimpleNamespace(grade=grade, lpec=SimpleNamespace(descent=descent), feasible=True))
+        return _Solution(f, nlp=SimpleNamespace(w=w, solved=solved), equal=equal)
+
+    certificates, done = [], []
+    certify = lambda nlp, equal: done.append(nlp) or certificates[len(done) - 1]  # noqa: E731
+    compiled = SimpleNamespace(eta=SimpleNamespace(numel=lambda: 1))
+    solutions = BranchSolutions(SimpleNamespace(compiled=compiled, tolerances=TOLERANCES, certify=certify))
+    one, other = (solutions._point(solution(**SOLUTION | some), np.inf, np.inf) for some in (first, then))
+    assert len(done) == 1 + is_new and (other.nlp is one.nlp) == (not is_new)

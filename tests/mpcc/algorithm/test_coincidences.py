@@ -74,3 +74,15 @@ def test_a_point_without_places_of_least_extent_takes_the_place_of_one_whose_ord
     monkeypatch.setattr(coincidences._short, 'fewer', lambda point: other)
     coincidences.settle()
     assert p.run.point is other is not before
+
+
+def test_orders_that_stayed_open_are_not_tried_again(monkeypatch):
+    p, coincidences, order = a_branch(lambda point: None, monkeypatch)
+    before, tried = p.run.point, []
+    monkeypatch.setattr(coincidences, '_outcome', lambda point: tried.append(point) or OPEN)
+    monkeypatch.setattr(coincidences._short, 'fewer', lambda point: None)
+    for _ in range(2):
+        p.run.point = replace(before, nlp=replace(before.nlp, w=before.w.copy()))
+        coincidences.settle()
+        assert p.run.point.certificate.grade is Stationarity.OPEN
+    assert len(tried) == 1
