@@ -29,6 +29,7 @@ from pyomo_fesd.core import (
     GENERATED,
     FesdError,
     contains_node,
+    data_of,
     declared,
     discretised,
     is_discretisation_equation,
@@ -206,15 +207,13 @@ def _active_places(block, without):
         if id(place) not in met:
             met.add(id(place))
             yield place
-            found = [b for c in declared(place, EVERYWHERE) if c.active for b in c.values() if b.active and id(b) not in met]
+            found = [b for c in declared(place, EVERYWHERE) if c.active for b in data_of(c) if b.active and id(b) not in met]
             waiting += reversed(found)
 
 
 def _active(component):
     """The active data of an active component."""
-    if not component.is_indexed():
-        return [component] if len(component) else []
-    return [data for data in component.values() if data.active]
+    return [data for data in data_of(component) if data.active]
 
 
 def _is_ours(component):
