@@ -142,7 +142,7 @@ SOUGHT_BESIDE = SOUGHT - {Constraint} | set(EVERYWHERE)
 
 def may_contain_functions(disjunct) -> bool:
     """Return whether something else than the Constraints of a disjunct may contain a piecewise function."""
-    return not disjunct._ctypes.keys().isdisjoint(SOUGHT_BESIDE)
+    return not SOUGHT_BESIDE.isdisjoint(disjunct._ctypes)
 
 
 def _refuse_written_by_pyomo(block, times):
