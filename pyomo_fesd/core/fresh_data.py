@@ -64,21 +64,30 @@ class _Pattern:
     def copy(self) -> BlockData:
         """Return a copy, of no component yet."""
         copies = [object.__new__(cls) for cls, *_ in self._parts]
-        for part, (_, shared, own) in zip(copies, self._parts):
-            for name, value in shared:
+        for part, (_, slots, made_slots, shared, made) in zip(copies, self._parts):
+            for name, value in slots.items():
                 _set(part, name, value)
-            for name, make in own:
+            for name, make in made_slots:
                 _set(part, name, make(copies))
+            attributes = part.__dict__
+            # most attributes: all at once
+            attributes.update(shared)
+            for name, make in made:
+                attributes[name] = make(copies)
         return copies[0]
 
 
 def _attributes(part, places):
-    """The values of attributes that all copies of a part share, and functions that make those that each has alone."""
+    """The slots and then the other attributes of a part, each as ``_shared_and_made``."""
     slots = {name: getattr(part, name) for name in part.__auto_slots__.slots if places[id(part)] or name not in OF_COMPONENT}
-    attributes = slots | part.__dict__
-    made = {name: _maker(value, places) for name, value in attributes.items()}
-    shared = [(name, value) for name, value in attributes.items() if made[name] is None]
-    return shared, [(name, make) for name, make in made.items() if make is not None]
+    return *_shared_and_made(slots, places), *_shared_and_made(part.__dict__, places)
+
+
+def _shared_and_made(attributes, places):
+    """The values of attributes that all copies of a part share, and functions that make those that each has alone."""
+    makers = {name: _maker(value, places) for name, value in attributes.items()}
+    shared = {name: value for name, value in attributes.items() if makers[name] is None}
+    return shared, [(name, make) for name, make in makers.items() if make is not None]
 
 
 def _maker(value, places) -> Callable | None:

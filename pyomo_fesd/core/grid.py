@@ -4,7 +4,7 @@ import sys
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import groupby
 from math import ceil, log10
 
@@ -153,8 +153,13 @@ def read_grid(wrt: ContinuousSet, stages: list[float], fixed_points: Iterable[fl
                 "let fesd.finite_elements discretise it, or scale time, e.g. write the model in milliseconds",
             )
         elements.append(Element(n, bisect_right(opening, left), left in opening, left in changing, left, right, labels))
-    weights = interpolation_weights(tau, [1 / (k + 1) for k in range(len(tau))])
-    return Grid(tuple(elements), tau, tuple(map(float, weights)))
+    return Grid(tuple(elements), tau, _quadrature_weights(tau))
+
+
+@cache
+def _quadrature_weights(tau):
+    """The weights of the integral over [0, 1]."""
+    return tuple(interpolation_weights(tau, [1 / (k + 1) for k in range(len(tau))]).tolist())
 
 
 def _between(points, left, right):

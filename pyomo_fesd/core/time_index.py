@@ -10,7 +10,7 @@ from pyomo.dae import ContinuousSet, DerivativeVar
 from pyomo.gdp import Disjunct, Disjunction
 
 from pyomo_fesd.core.errors import FesdError
-from pyomo_fesd.core.own_data import data_of, declared, entries_of
+from pyomo_fesd.core.own_data import data_of, declared, entries_of, own_components
 
 #: Endings of the names of pyomo.dae's own equations.
 DISCRETISATION = ('_disc_eq', '_cont_eq')
@@ -273,7 +273,7 @@ def find_continuous_set(block, wrt, caller: str) -> ContinuousSet:
     refuse_no_model(block, caller)
     if wrt is not None:
         return _checked(wrt, block, caller)
-    levels = (ComponentSet(root.component_objects(ContinuousSet, descend_into=True)) for root in (block, block.model()))
+    levels = (ComponentSet(own_components(root, ContinuousSet, Block)) for root in (block, block.model()))
     found = next(filter(None, levels), ())
     if len(found) == 1:
         return next(iter(found))

@@ -93,10 +93,9 @@ class Collocation(Collocation_Discretization_Transformation):
                 wrt.add(round(left + c * (right - left), self._decimals))
 
     def _set(self, wrt, tau):
-        rates = derivatives(tau)
         self._tau[wrt], self._afinal[wrt] = list(tau), None
-        # row i: polynomial i
-        self._adot[wrt], self._adotdot[wrt] = rates.T.tolist(), (rates @ rates).T.tolist()
+        # row i: polynomial i; lists of its own, since the ContinuousSet keeps them
+        self._adot[wrt], self._adotdot[wrt] = (rates.T.tolist() for rates in _first_and_second(tau))
 
 
 def _read_states_directly(block, wrt):
@@ -163,6 +162,13 @@ def _differences(tau):
 
 def _barycentric_weights(tau):
     return 1 / _differences(tau).prod(axis=1)
+
+
+@cache
+def _first_and_second(tau):
+    """The matrices of the first and the second derivative, of the few schemes that there are."""
+    rates = derivatives(tau)
+    return rates, rates @ rates
 
 
 def derivatives(tau: list[float]) -> np.ndarray:

@@ -100,7 +100,9 @@ def differ(statements: list[Sequence]) -> bool:
     for leaves in map(_leaves, statements):
         by_length[len(leaves)].append(leaves)
     # a factor of 1 or a term of 0 leaves an expression that is built otherwise
-    change = any(_unequal(a, b) for first, *others in by_length.values() for other in others for a, b in zip(first, other))
+    pairs = ((first, other) for first, *others in by_length.values() for other in others)
+    # most have the same numbers
+    change = any(_unequal(a, b) for first, other in pairs if first != other for a, b in zip(first, other))
     if not change and len(by_length) == 1:
         return False
     bodies = list(map(_body, statements))

@@ -16,7 +16,16 @@ from pyomo.core.expr.calculus.diff_with_pyomo import DifferentiationException
 from pyomo.core.expr.visitor import identify_variables
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import Pair, TimeIndex, derivatives, is_generated, known_sign, read_complementarity
+from pyomo_fesd.core import (
+    Pair,
+    TimeIndex,
+    data_of,
+    derivatives,
+    is_generated,
+    known_sign,
+    own_components,
+    read_complementarity,
+)
 
 
 def monotone_conditions(model: Block, times: TimeIndex, labels: set[float], known) -> ComponentMap:
@@ -29,8 +38,10 @@ def monotone_conditions(model: Block, times: TimeIndex, labels: set[float], know
     """
     found = ComponentMap()
     dynamic = ComponentSet(v for d in derivatives(model, times.wrt) for v in (d, d.get_state_var()))
-    for condition in model.component_data_objects(Complementarity, active=True, descend_into=Block):
-        if times.time(condition) in labels - {None} and not is_generated(condition):
+    # by component: most are generated, and have a condition at every time
+    components = (c for c in own_components(model, Complementarity, Block, active=True) if not is_generated(c))
+    for condition in (data for component in components for data in data_of(component)):
+        if condition.active and times.time(condition) in labels - {None}:
             v = _determined(read_complementarity(condition))
             if v is not None and not any(u in has for u in (v, v.parent_component()) for has in (dynamic, known, found)):
                 found[v] = condition

@@ -12,7 +12,7 @@ from functools import cache
 from pyomo.core import Block, Expression
 from pyomo.dae import ContinuousSet, Integral
 
-from pyomo_fesd.core import FesdError, MovingGrid, index_tuple, integrand_rewriter
+from pyomo_fesd.core import FesdError, MovingGrid, index_tuple, integrand_rewriter, own_components
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def integrands(block: Block, wrt: ContinuousSet) -> Iterator[Integrand]:
 
 def integrals(block: Block, wrt: ContinuousSet) -> Iterator[Integral]:
     """Yield every Integral over ``wrt``, also after pyomo.dae made it an Expression."""
-    for integral in block.component_objects((Integral, Expression), descend_into=Block):
+    for integral in own_components(block, (Integral, Expression), Block):
         if isinstance(integral, Integral) and integral.get_continuousset() is wrt:
             yield integral
 

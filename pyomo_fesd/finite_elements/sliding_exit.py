@@ -17,6 +17,8 @@ Leaves: ``slope`` and ``below`` (positive where H has no slope, where G ends bel
 Does not apply: with one collocation point, whose polynomial has no slope; at boundaries of control stages.
 """
 
+from functools import cache
+
 import numpy as np
 from pyomo.core import Constraint, Expression
 from pyomo.mpec import Complementarity, complements
@@ -79,13 +81,15 @@ def _positive(expr):
     return (abs(expr) + expr) / 2
 
 
-def derivative_at_zero(tau: tuple[float, ...]) -> list[float]:
+@cache
+def derivative_at_zero(tau: tuple[float, ...]) -> tuple[float, ...]:
     """Return d with f'(0) = sum_j d_j f(c_j) for polynomials through 0, c_1, ..., c_K."""
-    return interpolation_weights([0.0, *tau], np.eye(len(tau) + 1)[1]).tolist()
+    return tuple(interpolation_weights([0.0, *tau], np.eye(len(tau) + 1)[1]).tolist())
 
 
-def value_at_one(tau: tuple[float, ...]) -> list[float]:
+@cache
+def value_at_one(tau: tuple[float, ...]) -> tuple[float, ...]:
     """Return l with f(1) = sum_j l_j f(c_j) for polynomials through c_1, ..., c_K; exact zeros where c_K = 1."""
     if tau[-1] == 1:
-        return [0.0] * (len(tau) - 1) + [1.0]
-    return interpolation_weights(tau, np.ones(len(tau))).tolist()
+        return (*[0.0] * (len(tau) - 1), 1.0)
+    return tuple(interpolation_weights(tau, np.ones(len(tau))).tolist())

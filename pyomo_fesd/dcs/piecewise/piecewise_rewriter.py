@@ -29,6 +29,7 @@ from pyomo_fesd.core import (
     GENERATED,
     FesdError,
     contains_node,
+    data_of,
     declared,
     discretised,
     is_discretisation_equation,
@@ -141,7 +142,7 @@ SOUGHT_BESIDE = SOUGHT - {Constraint} | set(EVERYWHERE)
 
 def may_contain_functions(disjunct) -> bool:
     """Return whether something else than the Constraints of a disjunct may contain a piecewise function."""
-    return not disjunct._ctypes.keys().isdisjoint(SOUGHT_BESIDE)
+    return not SOUGHT_BESIDE.isdisjoint(disjunct._ctypes)
 
 
 def _refuse_written_by_pyomo(block, times):
@@ -206,15 +207,13 @@ def _active_places(block, without):
         if id(place) not in met:
             met.add(id(place))
             yield place
-            found = [b for c in declared(place, EVERYWHERE) if c.active for b in c.values() if b.active and id(b) not in met]
+            found = [b for c in declared(place, EVERYWHERE) if c.active for b in data_of(c) if b.active and id(b) not in met]
             waiting += reversed(found)
 
 
 def _active(component):
     """The active data of an active component."""
-    if not component.is_indexed():
-        return [component] if len(component) else []
-    return [data for data in component.values() if data.active]
+    return [data for data in data_of(component) if data.active]
 
 
 def _is_ours(component):

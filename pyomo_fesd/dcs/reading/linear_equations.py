@@ -81,19 +81,22 @@ def read_equation(constraint) -> LinearEquation:
     return LinearEquation(constraint, linear, rest, nonlinear, ComponentSet(alone))
 
 
-def _matrix(equations, defined):
-    return np.array([[value(e.linear.get(v, 0)) for v in defined] for e in equations], dtype=float)
+def _rows(equations, defined):
+    return [[value(e.linear.get(v, 0)) for v in defined] for e in equations]
+
+
+def _have_one_each(rows):
+    """Whether each row has one entry that is not zero, in a column of its own: the usual case, without a decomposition."""
+    places = [[k for k, factor in enumerate(row) if factor] for row in rows]
+    return all(len(some) == 1 for some in places) and len({k for (k,) in places}) == len(rows)
 
 
 def solvable(equations, defined) -> bool:
     """Whether the equations are linear in ``defined`` with a constant, nonsingular matrix."""
     if any(v in e.nonlinear for e in equations for v in defined):
         return False
-    A = _matrix(equations, defined)
-    if np.count_nonzero(A) == len(defined):
-        # the usual case, one variable an equation, without a decomposition
-        return bool(A.any(axis=0).all() and A.any(axis=1).all())
-    return np.linalg.matrix_rank(A) == len(defined)
+    rows = _rows(equations, defined)
+    return _have_one_each(rows) or bool(np.linalg.matrix_rank(np.array(rows, dtype=float)) == len(defined))
 
 
 def matching(equations, defined) -> bool:
@@ -109,14 +112,14 @@ def solve(equations, defined) -> tuple[list, list]:
     The right-hand sides are None where the mode has no explicit form.
     """
     if solvable(equations, defined):
-        A = _matrix(equations, defined)
-        if np.count_nonzero(A) == len(defined):
+        rows = _rows(equations, defined)
+        if _have_one_each(rows):
             # one variable an equation: the factor may be a mutable Param, so it stays an expression
-            order = [equations[int(np.flatnonzero(column)[0])] for column in A.T]
+            order = [next(e for e, factor in zip(equations, column) if factor) for column in zip(*rows)]
             known = ComponentSet(defined)
             return [e.solved(known, e.linear[v]) for e, v in zip(order, defined)], [[e.constraint] for e in order]
         if _have_constant_factors(equations, defined):
-            return _solve_together(equations, defined, np.linalg.inv(A))
+            return _solve_together(equations, defined, np.linalg.inv(np.array(rows, dtype=float)))
     return [None] * len(defined), [[e.constraint for e in equations] for _ in defined]
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from itertools import chain
 
 from pyomo.common.numeric_types import native_numeric_types
-from pyomo.core import Block, Constraint
 
 from pyomo_fesd.core import FesdError, known_sign
+from pyomo_fesd.dcs.reading.disjunction_tree import active_constraints
 from pyomo_fesd.dcs.reading.sampled_functions import SMALLEST_MARGIN, DistinctFunctions, sample
 from pyomo_fesd.dcs.reading.sign_patterns import SignPatterns, Stated, read_sign_patterns
 
@@ -98,7 +98,7 @@ def _yields(mode, other):
 
 
 def _has_inequality(disjunct):
-    return any(not con.equality for con in disjunct.component_data_objects(Constraint, active=True, descend_into=Block))
+    return any(not con.equality for con in active_constraints(disjunct))
 
 
 def _sign_matrix(disjunction, modes, stated):
