@@ -4,6 +4,7 @@ Takes: values near a branch and its zero sides.
 Leaves: a ``Point``; None where the branch has no solution.
 """
 
+from collections import defaultdict
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Optional
@@ -80,7 +81,7 @@ class BranchSolutions:
 
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
-        self.at_once, self._known, self._certified = at_once and self._c.eta.numel() > 0, {}, []
+        self.at_once, self._known, self._certified = at_once and self._c.eta.numel() > 0, {}, defaultdict(list)
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -93,7 +94,7 @@ class BranchSolutions:
         start = self._subsolves.on_sides(w, zero)
         if start is None:
             return None
-        key = hash((start.tobytes(), zero.tobytes(), self._c.lbx.tobytes(), self._c.ubx.tobytes(), *sorted(more.items())))
+        key = hash((start.tobytes(), zero.tobytes(), self._bounds(), *sorted(more.items())))
         found = self._known.get(key)
         if found is None or (found.is_left and not _is_clearly_above(found.f, below)):
             self._known[key] = found = self._solution(w, zero, duals, below, **more)
@@ -135,15 +136,20 @@ class BranchSolutions:
 
     def _certify(self, found):
         found.certificate = self._subsolves.certify(found.nlp, found.equal)
-        self._certified.append(found)
+        self._certified[self._bounds()].append(found)
         return found
 
     def _certified_before(self, found):
-        """The same solution with its certificate, from another branch; None if it is new.
+        """The same solution with its certificate, from another branch within the same bounds; None if it is new.
 
         One of which the LPEC found a descent that may be round-off is certified anew.
         """
-        return next((one for one in self._certified if _is_clear(one.certificate) and _is_same(one, found)), None)
+        known = self._certified[self._bounds()]
+        return next((one for one in known if _is_clear(one.certificate) and _is_same(one, found)), None)
+
+    def _bounds(self):
+        """The present bounds of the variables: without guide bounds, or with an extent of 0, another problem is solved."""
+        return hash((self._c.lbx.tobytes(), self._c.ubx.tobytes()))
 
     def _solution(self, w, zero, duals, below, **more):
         more |= {'steepest': STEEP * max(1.0, abs(below)), 'stalls': self._stalls(**more)}

@@ -70,7 +70,7 @@ def test_only_a_branch_with_decisions_is_left_above_the_tolerance(at_once, pairs
 
 
 SOLUTION = {'w': np.array([1.0, 50.0]), 'f': 2.0, 'solved': True, 'equal': np.array([True])}
-SOLUTION |= {'grade': Stationarity.B, 'descent': 0.0}
+SOLUTION |= {'grade': Stationarity.B, 'descent': 0.0, 'lbx': np.zeros(2)}
 
 
 @pytest.mark.parametrize(
@@ -84,16 +84,19 @@ SOLUTION |= {'grade': Stationarity.B, 'descent': 0.0}
         ({}, {'f': 2.0 + 1e-6}, True),
         ({}, {'solved': False}, True),
         ({}, {'equal': np.array([False])}, True),
+        ({}, {'lbx': np.array([0.0, 1.0])}, True),
     ],
 )
 def test_a_solution_that_another_branch_has_too_is_certified_once(first, then, is_new):
-    def solution(w, f, solved, equal, grade, descent):
+    def point(w, f, solved, equal, grade, descent, lbx):
+        compiled.lbx = lbx
         certificates.append(SimpleNamespace(grade=grade, lpec=SimpleNamespace(descent=descent), feasible=True))
-        return _Solution(f, nlp=SimpleNamespace(w=w, solved=solved), equal=equal)
+        solution = _Solution(f, nlp=SimpleNamespace(w=w, solved=solved), equal=equal)
+        return solutions._point(solution, np.inf, np.inf)
 
     certificates, done = [], []
     certify = lambda nlp, equal: done.append(nlp) or certificates[len(done) - 1]  # noqa: E731
-    compiled = SimpleNamespace(eta=SimpleNamespace(numel=lambda: 1))
+    compiled = SimpleNamespace(eta=SimpleNamespace(numel=lambda: 1), ubx=np.ones(2))
     solutions = BranchSolutions(SimpleNamespace(compiled=compiled, tolerances=TOLERANCES, certify=certify))
-    one, other = (solutions._point(solution(**SOLUTION | some), np.inf, np.inf) for some in (first, then))
+    one, other = (point(**SOLUTION | some) for some in (first, then))
     assert len(done) == 1 + is_new and (other.nlp is one.nlp) == (not is_new)
