@@ -64,7 +64,16 @@ from pyomo_fesd.core.interruption import DeferredInterrupt, interrupt_handled, i
 from pyomo_fesd.core.keywords import check_keywords, read_keywords
 from pyomo_fesd.core.moving_grid import MovingGrid, Split, add_moving_grid, moving_grids
 from pyomo_fesd.core.node_search import contains_node, leaves_of
-from pyomo_fesd.core.own_data import data_of, declared, entries_of, own_blocks, own_components, own_data, variables_below
+from pyomo_fesd.core.own_data import (
+    count_of,
+    data_of,
+    declared,
+    entries_of,
+    own_blocks,
+    own_components,
+    own_data,
+    variables_below,
+)
 from pyomo_fesd.core.parts import Part
 from pyomo_fesd.core.paused_collection import paused_collection
 from pyomo_fesd.core.phase import phase

@@ -11,6 +11,9 @@ from operator import itemgetter
 from pyomo.core import Block, Var
 from pyomo.core.base.block import BlockData
 
+#: Place of the number of components of a type in Pyomo's table of the types of a block.
+COUNT = 2
+
 
 def own_components(
     block: Block, ctype, descend_into, active: bool | None = None, enter: Callable[[BlockData], bool] | None = None
@@ -53,6 +56,11 @@ def declared(block: Block, types: Collection) -> Iterable:
     if len(types) > 1:
         found.sort(key=itemgetter(0))
     return [component for _, component in found]
+
+
+def count_of(block: Block, ctype) -> int:
+    """Return how many components of one type a block itself has declared, by Pyomo's own count."""
+    return block._ctypes[ctype][COUNT] if ctype in block._ctypes else 0
 
 
 def is_reference(component) -> bool:

@@ -17,6 +17,7 @@ from pyomo_fesd.core import (
     MovingGrid,
     TimeIndex,
     add_moving_grid,
+    count_of,
     derivatives,
     discretised,
     find_continuous_set,
@@ -341,4 +342,4 @@ def _variables_over_time(model, times):
 def _has_more_than_indicator(place):
     """Whether a block is not a disjunct, or has variables beside the binary of its indicator."""
     types = place._ctypes
-    return place.ctype is not Disjunct or types[Var][2] > 1 or Block in types or Disjunct in types
+    return place.ctype is not Disjunct or count_of(place, Var) > 1 or Block in types or Disjunct in types

@@ -4,7 +4,7 @@ import pyomo.environ as pyo
 import pytest
 from pyomo.gdp import Disjunct
 
-from pyomo_fesd.core.own_data import declared, own_components, own_data, variables_below
+from pyomo_fesd.core.own_data import count_of, declared, own_components, own_data, variables_below
 
 
 @pytest.fixture
@@ -96,3 +96,9 @@ def test_blocks_below_are_passed_over_on_request():
 
     assert names(own_components(m, pyo.Var, pyo.Block, enter=enter)) == ['b[2].z']
     assert asked == ['b[1]', 'b[2]']
+
+
+def test_components_of_a_type_are_counted_on_the_block_itself(m):
+    assert [count_of(m, ctype) for ctype in (pyo.Var, pyo.Block, pyo.Constraint)] == [3, 1, 0]
+    m.del_component(m.x)
+    assert count_of(m, pyo.Var) == 2

@@ -9,12 +9,10 @@ from pyomo.dae import DerivativeVar
 from pyomo.gdp import Disjunct
 from pyomo.mpec import Complementarity
 
-from pyomo_fesd.core import FesdError, variables_that_count
+from pyomo_fesd.core import FesdError, count_of, variables_that_count
 
 #: Types of the components of most disjuncts; one Var is the binary of the indicator.
 PLAIN = {BooleanVar, Var, Constraint}
-#: Place of the number of components of a type in Pyomo's own table of types.
-COUNT = 2
 #: Components that a disjunct over time cannot contain (a Disjunct only if it belongs to another tree): cause and fix.
 REFUSED_INSIDE = {
     Disjunct: (
@@ -42,7 +40,7 @@ def _other_components(disjunct):
     ctypes = disjunct._ctypes
     if Block in ctypes:
         return disjunct.component_objects(descend_into=Block)
-    plain = ctypes.keys() <= PLAIN and ctypes[Var][COUNT] == 1
+    plain = ctypes.keys() <= PLAIN and count_of(disjunct, Var) == 1
     return () if plain else disjunct.component_map().values()
 
 

@@ -194,7 +194,8 @@ class BranchSolutions:
             return _Solution(nlp=solved, equal=equal)
         first = self._subsolves.attempt(w, zero, None, 1.0, duals=duals, **more)
         if first is not None and not self._subsolves.usable(first):
-            solved, equal = self._decided_from_afar(w, zero, first, **more) if self._c.eta.numel() else (None, None)
+            asked = self._subsolves.asked(w, zero) if self._c.eta.numel() else None
+            solved, equal = (None, None) if asked is None else self._decided_from_afar(w, zero, asked, first, **more)
         elif first is not None and first.solved and _is_clearly_above(self._c.evaluate(first.w).f, below):
             return _Solution(self._c.evaluate(first.w).f, is_left=True)
         else:
@@ -208,18 +209,18 @@ class BranchSolutions:
         if first is None:
             return None, None
         if not self._subsolves.usable(first):
-            return self._decided_from_afar(w, zero, first, **more)
+            return self._decided_from_afar(w, zero, equal, first, **more)
         return self._with_all(first, zero, equal, **more)
 
-    def _decided_from_afar(self, w, zero, first, **more):
-        """One NLP with the decisions that the sides of the branch ask for, after an attempt ``first`` that came near.
+    def _decided_from_afar(self, w, zero, equal, first, **more):
+        """One NLP with the decisions ``equal`` that the sides of the branch ask for, after an attempt ``first`` that came near.
 
         Without decisions places without a change may shrink to nothing, and the equations of what they hold lose their rank.
         """
         at_sides = self._subsolves.on_sides(w, zero)
         if self._subsolves.violation(first.w) > max(NEAR, NEARER * self._subsolves.violation(at_sides)):
             return None, None
-        equal, more = self._subsolves.asked(w, zero), more | {'max_iter': None, 'duals': None}
+        more |= {'max_iter': None, 'duals': None}
         return self._with_all(self._subsolves.branch(w, zero, equal, 0.0, far=True, **more), zero, equal, far=True, **more)
 
     def decided(self, first, zero, apart=False, **more):

@@ -20,7 +20,7 @@ from pyomo_fesd.mpcc.subproblems.active_set import FREE
 from pyomo_fesd.mpcc.subproblems.differences import Differences
 from pyomo_fesd.mpcc.subproblems.impact_sides import give_interior
 from pyomo_fesd.mpcc.subproblems.linear_program import Program, infeasible
-from pyomo_fesd.mpcc.subproblems.newton import Newton, Tolerances
+from pyomo_fesd.mpcc.subproblems.newton import Newton, NewtonTolerances
 from pyomo_fesd.mpcc.subproblems.side_constraints import settle, with_shares
 from pyomo_fesd.mpcc.subproblems.single_rows import fix_single
 
@@ -53,7 +53,7 @@ class Branch:
         self._c, self._sides, self._make = c, sides, make
         self._rows = [*sides.chosen, *range(2 * c.pairs, c.inner)]
         self._optimality = max(OPTIMALITY * min(1.0, c.scale.f), LEAST)
-        self._newton = Newton(c, sides.chosen, Tolerances(FEASIBILITY, self._optimality))
+        self._newton = Newton(c, sides.chosen, NewtonTolerances(FEASIBILITY, self._optimality))
 
     # most branches near the end of a relaxation need no NLP solver
 

@@ -32,7 +32,7 @@ SHIFT = 1e-8
 
 
 @dataclass(frozen=True)
-class Tolerances:
+class NewtonTolerances:
     """Largest violation of rows and bounds, and of stationarity and complementarity of their multipliers."""
 
     violation: float
@@ -71,7 +71,7 @@ class Newton:
     c : MpccFunctions
     sides : int array
         sides with a row; the rows of a branch are g and these
-    tolerances : Tolerances
+    tolerances : NewtonTolerances
     """
 
     def __init__(self, c, sides, tolerances):
