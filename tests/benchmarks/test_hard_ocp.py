@@ -1,11 +1,13 @@
 """The replay of hard optimal control problems against exact answers, and their models."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pyomo.environ as pyo
 import pytest
-from benchmarks.hard_ocp import ball, carts, cases, discs, hopper
+from benchmarks.hard_ocp import ball, carts, cases, discs, hopper, summary
 from benchmarks.hard_ocp.replay import Plant, replay
 from scipy.optimize import brentq
 
@@ -188,3 +190,18 @@ def test_the_twin_in_nosnoc_states_the_same_problem(p):
     assert rates.full().ravel() == pytest.approx(expected)
     assert float(paid) == pytest.approx(speed * p.PLANT.rate(q, v, u, 4))
     assert float(final) == pytest.approx(p.final_cost(q, v))
+
+
+def test_points_on_the_way_are_solutions_of_branches_and_each_better_than_those_before():
+    steps = [('relaxation', 1.0, 0.0), ('branch', 9.0, 1e-3), ('branch', 8.0, 0.0), ('branch', 8.5, 0.0), ('branch', 7.0, 1e-9)]
+    steps = [SimpleNamespace(kind=kind, f=f, violation=off, complementarity=0.0, seconds=2.0) for kind, f, off in steps]
+    assert cases.better_points(steps, 1.0, 21.0) == '13:8 21:7'
+
+
+def test_a_run_is_as_good_when_it_has_a_point_of_at_most_the_true_cost_of_the_peer():
+    ours = {'method': 'contact', 'replayed': 5.0, 'cpu': 30.0}
+    better = {0: '2:90 6:40 20:5', 1: '2:90', 2: np.nan}
+    rows = [{'problem': 'ball', 'seed': k, 'better': text} | ours for k, text in better.items()]
+    rows += [{'problem': 'ball', 'seed': k, 'method': 'nosnoc', 'replayed': 40.0, 'cpu': 12.0} for k in better]
+    found = summary.seconds_until_as_good(pd.DataFrame(rows))
+    assert found.to_dict() == {('ball', 'contact', 0): 0.5, ('ball', 'contact', 1): np.inf}

@@ -14,6 +14,8 @@ PROBLEMS = ('carts', 'discs', 'hopper', 'ball')
 GUESS = 0.1
 #: A run ends at its time limit; its process is killed when it has used this multiple of it.
 KILL = 1.5
+#: Violation and complementarity of a point that counts as a solution on the way.
+FEASIBLE = 1e-8
 
 
 def module(problem):
@@ -83,7 +85,22 @@ def with_pyomo_fesd(p, form, given, options, limit, tee=False):
         'nlps': int(results.solver.nlps),
         'build': built - started,
         'cpu': time.process_time() - started,
+        'better': better_points(results.solver.steps, built - started, time.process_time() - started),
     }, p.controls(m)
+
+
+def better_points(steps, begin, end):
+    """Points of branches that are better than all before, as ``seconds:objective`` with blanks between.
+
+    ``begin`` and ``end`` of the solve are CPU seconds; those between are in proportion to the seconds of the log.
+    """
+    found, best, passed, total = [], np.inf, 0.0, sum(step.seconds for step in steps)
+    for step in steps:
+        passed += step.seconds
+        if step.kind == 'branch' and max(step.violation, step.complementarity) <= FEASIBLE and step.f < best:
+            best = step.f
+            found.append(f'{begin + (end - begin) * passed / total:.4g}:{best:.6g}')
+    return ' '.join(found)
 
 
 def split(p, form, options):

@@ -40,7 +40,7 @@ FOUND = (
     'cpu',
     'seconds',
 )
-COLUMNS = (*KEY, 'limit', *FOUND, 'residual', 'status of replay')
+COLUMNS = (*KEY, 'limit', *FOUND, 'residual', 'status of replay', 'better')
 
 
 def in_process(problem, method, seed, options, limit):
