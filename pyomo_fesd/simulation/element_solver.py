@@ -35,6 +35,9 @@ TRIES = (
     {'lpec': 'full'},
     {'lpec': 'full', 'starts': 6},
 )
+#: How many of these are tried where the elements are only a start, and nothing else: from where the last element ended most steps
+#: are found, and searches, up to some seconds a step, mostly find bodies on another side of a surface.
+QUICK = 1
 #: Where a solution can be followed for less than the first part of a step, and no step is found, other searches and starts do not
 #: help.  A switch that ends it is found in a step at most so many times as long as it was followed.
 ENDS, FOLLOWED = 1e-3, (2.0, 10.0)
@@ -48,7 +51,8 @@ TURNED = 1e-6
 class ElementSolver:
     """Solves the elements of one moving grid in their order; errors say the ``progress``.
 
-    Parameters as of ``simulate``; ``lengths`` by the number of an element, where they are usually not near the nominal one.
+    Parameters as of ``simulate``; ``lengths`` by the number of an element, where they are usually not near the nominal one;
+    ``quick`` where a failure costs less than a long search.
 
     Attributes
     ----------
@@ -56,9 +60,9 @@ class ElementSolver:
         variables with known values
     """
 
-    def __init__(self, model, times: TimeIndex, inputs, options, timer, progress: Progress, lengths: dict | None = None):
+    def __init__(self, model, times: TimeIndex, inputs, options, timer, progress: Progress, lengths=None, quick=False):
         self._model, self._first, self._options, self._timer = model, times.wrt.first(), options, timer
-        self._times, self._progress, self._lengths = times, progress, lengths or {}
+        self._times, self._progress, self._lengths, self._quick = times, progress, lengths or {}, quick
         self._moving = moving_grids(model)[times.wrt]
         self._grid, self._hysteresis = self._moving.grid, read_hysteresis(self._moving)
         self._jumps = JumpEvents(self._moving.state_jumps)
@@ -190,7 +194,8 @@ class ElementSolver:
         element_class, longest = self._class_of(equations, element), max(most, self._usual_length(element))
         found = element_class.newton_step(equations, self._end, most, lambda: self._left_boundary(equations, element))
         if found is None:
-            found = self._mpcc_step(element_class, equations, most, TRIES[not warm :], NO_STEP * longest, element)
+            search = self._quick_step if self._quick else self._mpcc_step
+            found = search(element_class, equations, most, TRIES[not warm :], NO_STEP * longest, element)
         h, end = found
         h = most if h > most - CUT * longest else h
         self._moving.r[element.n].set_value(h / element.length, skip_validation=True)
@@ -251,6 +256,14 @@ class ElementSolver:
         except KeyError:
             found = None
         return v.value if found is None else found
+
+    def _quick_step(self, element_class, equations, most, tries, no_step, element):
+        """As ``_mpcc_step``, by the first tries only."""
+        for options in tries[:QUICK]:
+            answer, h = self._longest(element_class, equations, most, options)
+            if answer.stationarity == 'B' and h > no_step:
+                return element_class.accept_mpcc(equations, most, h)
+        raise self._progress.error(f"no step was found from time {self._progress.time:.6g} at once", "simulate the model alone")
 
     def _mpcc_step(self, element_class, equations, most, tries, no_step, element):
         """A step longer than ``no_step`` where the next active set is unknown, or does not hold."""

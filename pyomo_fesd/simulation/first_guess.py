@@ -12,12 +12,12 @@ from pyomo_fesd.simulation.timeless_equations import timeless_equations
 from pyomo_fesd.solvers import register_simulation
 
 
-def simulate_first(model: Block, demanded: bool, timer: HierarchicalTimer, seconds: float | None) -> bool:
+def simulate_first(model: Block, demanded: bool, quick: bool, timer: HierarchicalTimer, seconds: float | None) -> bool:
     """Write the values of a simulation into the model; returns False where it does not apply.
 
     It applies to models on one moving grid with lengths that vary, whose states are not fixed later, and which have no objective:
     an objective may also choose among solutions that are not unique.  Held controls keep their values.  With ``demanded`` only the
-    grid counts.
+    grid counts.  With ``quick`` it ends where a step is not found at once.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def simulate_first(model: Block, demanded: bool, timer: HierarchicalTimer, secon
     with phase(timer, 'simulate'), kept_values(states_fixed_later(model, wrt)):
         times = TimeIndex(wrt)
         solve_static_equations(timeless_equations(model, times), times)
-        Simulation(model, times, [], {}, timer, Deadline.after(seconds)).run()
+        Simulation(model, times, [], {}, timer, Deadline.after(seconds), quick).run()
     return True
 
 

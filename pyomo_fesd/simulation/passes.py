@@ -24,15 +24,18 @@ SHORT_INTERVAL = (
 
 
 class Simulation:
-    """Element-by-element simulation on one moving grid; parameters as of ``simulate``, with a TimeIndex and a Deadline."""
+    """Element-by-element simulation on one moving grid; parameters as of ``simulate``, with a TimeIndex and a Deadline.
 
-    def __init__(self, model, times, inputs, options, timer, deadline):
+    ``quick`` as of ElementSolver.
+    """
+
+    def __init__(self, model, times, inputs, options, timer, deadline, quick=False):
         self._timer = timer
         self._moving = moving_grids(model)[times.wrt]
         _refuse_sticking(self._moving.state_jumps)
         self._grid = self._moving.grid
         self._progress = Progress(times.wrt, self._grid.stages, deadline)
-        self._solver = ElementSolver(model, times, inputs, options, timer, self._progress)
+        self._solver = ElementSolver(model, times, inputs, options, timer, self._progress, quick=quick)
         self._simulated, self._warm = {}, False
 
     def run(self) -> None:

@@ -29,9 +29,9 @@ def register_simulation(simulation: Callable) -> None:
 
     Parameters
     ----------
-    simulation : callable (model, demanded, timer, seconds) -> bool
+    simulation : callable (model, demanded, quick, timer, seconds) -> bool
         writes the values of a simulation into the model; False where it does not apply, a FesdError where it fails; ``demanded``
-        also asks for one where something is free
+        also asks for one where something is free, and ``quick`` for one that fails rather than searches for long
     """
     _registered.append(simulation)
 
@@ -131,7 +131,7 @@ class SimulatedStart:
             if not v.fixed:
                 v.set_value(float(number), skip_validation=True)
         try:
-            complete = self._simulate("its controls simulated", True, seconds)
+            complete = self._simulate("its controls simulated", True, seconds, quick=True)
             note = "its controls simulated" + " in part" * (not complete)
             return compiled.present_values(), complete, note
         finally:
@@ -146,13 +146,13 @@ class SimulatedStart:
         finally:
             self.restore()
 
-    def _simulate(self, what, demanded, seconds=None):
+    def _simulate(self, what, demanded, seconds=None, quick=False):
         """Write a simulation into the model, with a note; returns whether there is one."""
         began, left = time.perf_counter(), self._deadline.left()
         try:
             with withheld_messages('pyomo_fesd'):
                 most = seconds if left is None else min(SHARE * left, seconds or left)
-                found = any(one(self._model, demanded, self._options.timer, most) for one in _registered)
+                found = any(one(self._model, demanded, quick, self._options.timer, most) for one in _registered)
             if found:
                 self.note = f"{what} in {time.perf_counter() - began:.2f} s (simulate_first): the values are the start"
         except FesdError as error:
