@@ -8,7 +8,7 @@ from itertools import chain
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import FIRST, SECOND, BranchSolutions, as_good
+from pyomo_fesd.mpcc.algorithm.branch_solutions import FIRST, SECOND, UNEVEN, BranchSolutions, as_good
 from pyomo_fesd.mpcc.algorithm.neighbours import Neighbours
 from pyomo_fesd.mpcc.algorithm.search import FEW, Verdict, exhaust, leaves
 from pyomo_fesd.mpcc.algorithm.state import Point
@@ -22,8 +22,9 @@ WORTH = 1e-6
 UNFINISHED = 1e-3
 #: Attempts at a branch NLP before it counts as infeasible.
 TRIES = 2
-#: The trust region of a descent step shrinks by this factor, so many times.
-SHRINK, SHRINKS = 0.1, 3
+#: The trust region of a descent step shrinks by this factor, so many times; once where a branch was followed onward from the point
+#: before (of ten such searches of discs, 3 to 5 s each, none has led down).
+SHRINK, SHRINKS = 0.1, {False: 3, True: 1}
 #: Ipopt leaves sides without a multiplier at the root of its tolerance.  Those below this count as zero as well, if this descends
 #: clearly: gradients are inexact too.
 NEARLY, CLEAR = 1e-4, 1e-4
@@ -168,6 +169,21 @@ class Branches:
             start[neighbour.starts] = neighbour.at
         self._widen_from(self.improve_from(self._point(start, zero, None, True, below=point.f), False))
 
+    def without_short(self, point):
+        """A certified solution without places of least extent beside a point that has some; None if there is none.
+
+        It may cost a little more (``as_good``): the places beside one of least extent are large, and the objective has their error.
+        Only where branches are solved with the decisions of their sides (``BranchSolutions.at_once``): others have even places.
+        """
+        if not self.solutions.at_once or not self.neighbours.number_of_short(point.w):
+            return None
+        enough = as_good(point, None)
+        for zero in self.neighbours.with_fewer_short(point):
+            found = self.solutions.certified(point.w, zero, max_iter=SECOND, below=enough, enough=enough)
+            if found is not None and found.certificate.certified and not self.neighbours.number_of_short(found.w):
+                return found
+        return None
+
     def _is_progress(self, before, part):
         """Whether the incumbent is better than a point ``before`` by this relative part."""
         return self.run.point.f < before.f - part * max(1.0, abs(before.f))
@@ -250,10 +266,15 @@ class Branches:
     def _keep(self, point):
         """Keep the better of the incumbent and ``point``: certified before uncertified, then the lower objective."""
         best = self.run.point
-        if best is None or (not point.certificate.certified, point.f) < (not best.certificate.certified, best.f):
+        if best is None or self._rank(point) < self._rank(best):
             self.run.point = point
         if self.run.lowest is None or point.f < self.run.lowest.f:
             self.run.lowest = point
+
+    def _rank(self, point):
+        """Certified points come first, then those of lower objective; places of least extent are charged for their error."""
+        error = UNEVEN * max(1.0, abs(point.f)) if self.solutions.at_once and self.neighbours.number_of_short(point.w) else 0.0
+        return not point.certificate.certified, point.f + error
 
     def descend(self, point, worth):
         """A better point, or None; a point that is not ``worth`` a descent only gets the check of its certificate."""
@@ -285,13 +306,13 @@ class Branches:
         # from the end of a direction Ipopt may go back; from the point itself it follows it, if slowly
         follows = self._patient and point.equal is not None
         onward = self.solutions.onward(point, step.zero, enough) if follows else None
-        return self._within_reach(point, enough) if onward is None else onward
+        return self._within_reach(point, enough, SHRINKS[follows]) if onward is None else onward
 
-    def _within_reach(self, point, enough):
+    def _within_reach(self, point, enough, times):
         """In the branch of the best direction within a trust region, which shrinks until one leads down."""
         w, radius = point.w, self._tolerances.radius
         sets = self._subsolves.sets(w, self._tolerances.biactive)
-        for _ in range(SHRINKS):
+        for _ in range(times):
             radius *= SHRINK
             step = self._subsolves.lpec(w, sets, radius, point.equal)
             if not step.solved or step.descent == 0.0:

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND
+from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND, as_good
 from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
 from pyomo_fesd.mpcc.algorithm.orders import NEAR_BOUND, Orders, has_more_at_end, rows
 from pyomo_fesd.mpcc.algorithm.short_places import ShortPlaces
@@ -23,6 +23,8 @@ from pyomo_fesd.mpcc.subproblems import ActiveSets, Stationarity, Verdict
 
 #: Iterations enough to show that there is no branch of an order.
 PATIENCE = 300
+#: Times that a point may be replaced by one with fewer places of least extent: others lead back to the same ones.
+REPLACED = 3
 #: Outcomes of an order: it leads to no better point; that could not be shown; or no branch on this grid contains the incumbent.
 SETTLED, OPEN, ABSENT = 'settled', 'open', 'absent'
 #: Verdicts that settle an order.
@@ -42,6 +44,7 @@ class Coincidences:
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._branches, self._settled = subsolves, branches, None
         self._orders, self._short, self._tried = Orders(subsolves), ShortPlaces(branches), {}
+        self._left = REPLACED
 
     def settle(self):
         """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
@@ -87,6 +90,9 @@ class Coincidences:
 
     def _takes_fewer_short(self, point):
         """Whether there is a point with fewer places of least extent, or a better one on the way, which is the incumbent now."""
+        if self._left == 0:
+            return False
+        self._left -= 1
         before, other = self.run.point, self._short.fewer(point)
         if other is not None:
             self.run.point = other
@@ -207,7 +213,7 @@ class Coincidences:
         """
         with self._c.vanishing(way.extents):
             found = self._without_extent(point, inserts, way)
-        return found if isinstance(found, str) else self._better(point, *found)
+        return found if isinstance(found, str) else self._better(point, *found, way.extents)
 
     def _grown(self, point, ways):
         """The first better point in the branches of some ways, from their places as they are; or None.
@@ -217,7 +223,7 @@ class Coincidences:
         for way in ways:
             start = way.start.copy()
             start[way.extents] = point.w[way.extents]
-            found = self._better(point, (start,), way.zero)
+            found = self._better(point, (start,), way.zero, way.extents)
             if found is not OPEN:
                 return found
         return None
@@ -276,6 +282,17 @@ class Coincidences:
             return None
         return (solved, equal) if solved.solved else (OPEN, None)
 
+    def _leads_back(self, found, extents, even, point):
+        """Whether places of an order have least extent in the solution of its branch, and without these it is ``point`` again.
+
+        Then they do not grow: no descent is left beside that solution, but for one that makes them even smaller, and what it gains
+        is the error of the places beside them.
+        """
+        stays = found.certificate.certified or found.certificate.grade is Stationarity.LIMITED
+        are_short = bool(np.all(found.w[extents] <= self._c.lbx[extents] + NEAR_BOUND))
+        alone = self._branches.neighbours.number_of_short(found.w) == len(extents)
+        return stays and are_short and alone and not self._is_another(point, even.nlp)
+
     def _is_another(self, point, other):
         """Whether another solution does not meet the incumbent: its places are not the same."""
         return abs(self._c.evaluate(other.w).f - point.f) > AS_GOOD * max(1.0, abs(point.f))
@@ -284,11 +301,20 @@ class Coincidences:
         """The decisions that involve variables: beside a place of extent zero nothing is decided, as changes lie on both sides."""
         return (self._c.gradients(w)[-1][:, variables].toarray() != 0.0).any(axis=1)
 
-    def _better(self, point, starts, zero):
-        """A point in the branch ``zero``, in which the places may grow, that is better than the incumbent; or OPEN."""
+    def _better(self, point, starts, zero, extents):
+        """A point in the branch ``zero``, in which the places ``extents`` may grow, that is better than the incumbent; or OPEN.
+
+        SETTLED where such a point is certified, but its places have not grown, and without them it is the incumbent.
+        """
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
+        most = as_good(point, None) if self._branches.solutions.at_once else point.f
         for start in starts:
-            found = self._branches.solutions.certified(start, zero, max_iter=SECOND, below=point.f)
+            found = self._branches.solutions.certified(start, zero, max_iter=SECOND, below=most)
+            even = None if found is None else self._branches.without_short(found)
+            if even is not None and even.f <= enough:
+                return even
+            if even is not None and self._leads_back(found, extents, even, point):
+                return SETTLED
             if found is not None and found.f <= enough:
                 return found
         return OPEN

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import SECOND
+from pyomo_fesd.mpcc.algorithm.branch_solutions import SECOND, as_good
 from pyomo_fesd.mpcc.algorithm.state import Point
 from pyomo_fesd.mpcc.algorithm.subsolves import INFEASIBLE
 from pyomo_fesd.mpcc.nlp import NlpResult
@@ -81,23 +81,39 @@ class Completions:
         for form, looser in self._paths:
             is_last = (form, looser) == self._paths[-1]
             leads_away = self._follow(form, start, self._options.eps_init * looser, is_last)
-            if leads_away and not is_last:
-                continue
-            if not self._possible or not (leads_away or self._promising()) or self._deadline.expired():
+            if not (self._possible or leads_away) or not self._promising() or self._deadline.expired():
                 break
         if self._left is not None and self._possible and self._is_far_below(self._last):
             self._follow(*self._left, True)
-        if self._further is not None and self._possible and self._promising():
-            form, looser = self._further
-            self._follow(form, start, self._options.eps_init * looser, True)
+        if self._possible and self._promising():
+            self._follow_further(start)
         if self.run.point is not None:
-            self._certify()
+            self._certify(self.run.point)
+
+    def further(self, start) -> bool:
+        """Follow one more path from ``start``, and certify its best point; returns whether there is one worth it."""
+        incumbent, self._solved = self.run.point, None
+        if not self._possible or self._deadline.expired() or not self._follow_further(start):
+            return False
+        if self._best is None or self._best.f - incumbent.f > GAP * abs(self._best.f):
+            self.run.point = incumbent
+            return False
+        self._certify(self._best)
+        return True
+
+    def _follow_further(self, start):
+        """Follow the further path, once; returns whether it was left."""
+        if self._further is None:
+            return False
+        (form, looser), self._further = self._further, None
+        self._follow(form, start, self._options.eps_init * looser, True)
+        return True
 
     def _follow(self, form, w, eps, is_last):
         """Follow one path from ``w``; return whether it leads away from all solutions."""
         self._form, self._best, self._share = form, None, 1.0
         leads_away = self._down(w, eps, is_last)
-        if is_last or not leads_away:
+        if is_last or not leads_away or not self._promising():
             self._improve()
         return leads_away
 
@@ -181,7 +197,7 @@ class Completions:
         self._subsolves.keep_least_infeasible(relaxed.w)
         if eps <= AROUND[0] * ROUND_OFF:
             self._last = self._c.evaluate(relaxed.w).f
-            self._promise = self._last if self._subsolves.usable(relaxed) else self._promise
+            self._promise = self._promise if relaxed.status in INFEASIBLE else self._last
         if not self._is_known(relaxed):
             seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
             end = self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))
@@ -236,22 +252,41 @@ class Completions:
         if solved.solved:
             self._solved = _lower(self._solved, point)
 
-    def _certify(self):
+    def _certify(self, best):
         """The certificate of the best point, and descent from it; where it is not certified, from the best solution of an NLP.
 
         Where an NLP was stopped the constraints hold, but nothing may lead on from there.
         """
-        best, solved = self.run.point, self._solved
+        solved = self._solved
         self._c.widen()
         if best.equal is None:
             # no NLP's solution: it is judged as it is, and its branch may have a better one
             self.run.point = replace(best, certificate=self._subsolves.judge(best.w))
             self._branches.explore_from(best.w, True)
         else:
+            even = self._branches.without_short(best) or self._simulated_again(best)
+            if even is not None:
+                self.run.point = even
+                self._branches.improve_from(even, True)
+                return
             self.run.point = self._judged(best)
             self._branches.improve_from(self.run.point, True)
         if solved is not None and solved is not best and not self.run.point.certificate.certified:
             self._branches.improve_from(self._judged(solved), True)
+
+    def _simulated_again(self, point):
+        """The certified solution of the branch that the controls of a point with places of least extent lead to; None without one.
+
+        A change that such a place keeps on one side of an end may happen on the other side of it.
+        """
+        if not self._branches.neighbours.number_of_short(point.w):
+            return None
+        completed, is_complete = self._subsolves.completed(self._complete, point.w, LEAST_TIME)
+        if not is_complete:
+            return None
+        zero, enough = self._subsolves.sets(completed, self._subsolves.tolerances.biactive).zero, as_good(point, None)
+        found = self._branches.solutions.certified(completed, zero, max_iter=SECOND, below=enough, enough=enough)
+        return found if found is not None and found.certificate.certified else None
 
     def _judged(self, point):
         """A point with its certificate."""

@@ -104,6 +104,7 @@ class HybridSolver:
                 return Outcome.NO_BRANCH if self.run.point is None else Outcome.FEASIBLE
             self._from_start()
             self._finish()
+            self._try_further_at_last()
             self._try_neighbours_at_last()
             self._try_lowest_at_last()
         if self.run.point is None:
@@ -154,6 +155,14 @@ class HybridSolver:
         if self._take_lowest() or had_less:
             self._finish()
         if self._certify_at_last():
+            self._finish()
+
+    def _try_further_at_last(self):
+        """Follow one more path where the incumbent is not certified in the end."""
+        if self._completions is None or self._is_certified():
+            return
+        self._branches.forget()
+        if self._completions.further(self._c.x0):
             self._finish()
 
     def _certify_at_last(self) -> bool:

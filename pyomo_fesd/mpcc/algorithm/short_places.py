@@ -11,7 +11,6 @@ from functools import partial
 
 from pyomo_fesd.mpcc.algorithm.branch_solutions import SECOND, as_good
 from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
-from pyomo_fesd.mpcc.subproblems import Stationarity
 
 #: Points with objectives as close as this, relative, are the same one, reached in other ways.
 SAME = 1e-8
@@ -72,11 +71,9 @@ class ShortPlaces:
                 continue
             self._tried.add(zero.tobytes())
             solved = self._solutions.certified(point.w, zero, max_iter=SECOND, below=enough, enough=enough)
-            end = self._branches.improve_from(solved, True)
-            if end is None or not self._is_new_with_fewer(number, end.f, end.w):
+            if solved is None or not solved.certificate.certified:
                 continue
-            if end.certificate.grade is Stationarity.LIMITED:
-                end = self._fewer(end, enough)
-            if end is not None and end.certificate.certified:
+            end = self._branches.improve_from(solved, True)
+            if end.certificate.certified and self._is_new_with_fewer(number, end.f, end.w):
                 return end
         return None

@@ -70,7 +70,7 @@ def test_where_the_best_point_is_not_certified_the_best_solution_is():
     solved = p.subsolves.branch(np.array(p.point(x=0.0, y=0.9)), np.array([G_ZERO]), none, 0.0)
     for result in (solved, replace(stopped, status=STALLED)):
         rounds._keep(result, none)
-    rounds._certify()
+    rounds._certify(p.run.point)
     assert p.run.point.certificate.grade is Stationarity.B and p.run.point.f == pytest.approx(1.0)
 
 
