@@ -263,3 +263,14 @@ def test_a_completion_leaves_the_model_as_it_was():
     assert is_complete
     assert np.abs(np.minimum(compiled.evaluate(w).G, compiled.evaluate(w).H)).max() < 1e-9
     assert [(v.value, v.stale) for v in m.component_data_objects(pyo.Var)] == before
+
+
+def test_a_completion_fails_rather_than_that_it_searches_for_long(monkeypatch):
+    m, asked = two_carts.build(4, 2), []
+    compiled = parts.compiled(m)
+    config = SolverFactoryV2('mpec_hybrid').config
+    config.timer = HierarchicalTimer()
+    monkeypatch.setattr(simulated_start, '_registered', [lambda model, demanded, quick, *args: asked.append((demanded, quick))])
+    start = simulated_start.SimulatedStart(m, config, Deadline())
+    start.completion(compiled)(compiled.x0, 10.0)
+    assert asked == [(False, False), (True, True)]

@@ -44,7 +44,7 @@ class Coincidences:
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._branches, self._settled = subsolves, branches, None
         self._orders, self._short, self._tried = Orders(subsolves), ShortPlaces(branches), {}
-        self._left = REPLACED
+        self._replacements = REPLACED
 
     def settle(self):
         """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
@@ -90,9 +90,9 @@ class Coincidences:
 
     def _takes_fewer_short(self, point):
         """Whether there is a point with fewer places of least extent, or a better one on the way, which is the incumbent now."""
-        if self._left == 0:
+        if not self._replacements:
             return False
-        self._left -= 1
+        self._replacements -= 1
         before, other = self.run.point, self._short.fewer(point)
         if other is not None:
             self.run.point = other

@@ -381,3 +381,34 @@ def test_branches_without_places_of_least_extent_are_those_of_all_and_of_each_on
     found = list(neighbours.with_fewer_short(replace(point, nlp=replace(point.nlp, w=at_bound))))
     zero = p.subsolves.sets(at_bound, 1e-8).zero
     assert len(found) > len(short) and all(np.any(other != zero) for other in found)
+
+
+def with_a_short_place(p):
+    """The incumbent with the variables of a neighbour at their lower bound."""
+    point, short = p.run.point, p.compiled.neighbours[0].short
+    w = point.w.copy()
+    w[short] = p.compiled.lbx[short]
+    return replace(point, nlp=replace(point.nlp, w=w))
+
+
+@pytest.mark.parametrize('gain, kept', [(0.5 * branch_solutions.UNEVEN, False), (2 * branch_solutions.UNEVEN, True)])
+def test_a_point_with_a_place_of_least_extent_has_to_be_better_by_the_error_of_those_beside_it(gain, kept):
+    p = jump_inside_a_stage()
+    p.branches.solutions.at_once = True
+    best = p.run.point = replace(p.run.point, f=1.0)
+    short = replace(with_a_short_place(p), f=1.0 - gain)
+    p.branches._keep(short)
+    assert (p.run.point is short) == kept and (p.run.point is best) != kept
+
+
+@pytest.mark.parametrize('at_once', [True, False])
+def test_places_of_least_extent_are_left_out(at_once):
+    p = jump_inside_a_stage()
+    p.branches.solutions.at_once = at_once
+    point = with_a_short_place(p)
+    found = p.branches.without_short(point)
+    assert p.branches.without_short(p.run.point) is None, "there is none"
+    if at_once:
+        assert found.certificate.certified and p.branches.neighbours.number_of_short(found.w) == 0
+    else:
+        assert found is None

@@ -8,7 +8,7 @@ from problems import carried
 from problems.parts import parts
 
 from pyomo_fesd.mpcc.algorithm.arrivals import Entered
-from pyomo_fesd.mpcc.algorithm.coincidences import OPEN, SETTLED, Coincidences
+from pyomo_fesd.mpcc.algorithm.coincidences import OPEN, REPLACED, SETTLED, Coincidences
 from pyomo_fesd.mpcc.algorithm.orders import Order
 from pyomo_fesd.mpcc.subproblems import Stationarity, Verdict
 
@@ -86,3 +86,58 @@ def test_orders_that_stayed_open_are_not_tried_again(monkeypatch):
         coincidences.settle()
         assert p.run.point.certificate.grade is Stationarity.OPEN
     assert len(tried) == 1
+
+
+def test_a_point_is_replaced_by_others_with_fewer_places_of_least_extent_a_few_times_only(monkeypatch):
+    p, coincidences, order = a_branch(lambda point: None, monkeypatch)
+    others = []
+
+    def fewer(point):
+        others.append(replace(point, f=point.f + 1e-3))
+        return others[-1]
+
+    monkeypatch.setattr(coincidences, '_outcome', lambda point: OPEN)
+    monkeypatch.setattr(coincidences._short, 'fewer', fewer)
+    coincidences.settle()
+    assert len(others) == REPLACED and p.run.point.certificate.grade is Stationarity.OPEN
+
+
+def vanished(gain, grade, monkeypatch):
+    """The Parts, Coincidences and order of a branch whose solution, better by ``gain``, has its place at the least extent."""
+    p, coincidences, order = a_branch(lambda point: found, monkeypatch)
+    point, (extent,), w = p.run.point, order.ways[0].extents, p.run.point.w.copy()
+    w[extent] = p.compiled.lbx[extent]
+    certificate = replace(point.certificate, grade=grade)
+    found = replace(point, f=point.f - gain, nlp=replace(point.nlp, w=w), certificate=certificate)
+    return p, coincidences, order, found
+
+
+@pytest.mark.parametrize('gain', [0.1, -1e-3])
+@pytest.mark.parametrize('grade', [Stationarity.B, Stationarity.LIMITED])
+def test_an_order_whose_place_vanishes_and_leads_back_to_the_point_is_settled(gain, grade, monkeypatch):
+    p, coincidences, order, found = vanished(gain, grade, monkeypatch)
+    monkeypatch.setattr(p.branches, 'without_short', lambda found: p.run.point)
+    assert coincidences._order(p.run.point, order, []) is SETTLED
+
+
+def test_it_is_not_settled_where_that_solution_may_descend(monkeypatch):
+    p, coincidences, order, found = vanished(0.1, Stationarity.DESCENT, monkeypatch)
+    monkeypatch.setattr(p.branches, 'without_short', lambda found: p.run.point)
+    assert coincidences._order(p.run.point, order, []) is found
+
+
+def test_nor_where_its_place_has_grown(monkeypatch):
+    p, coincidences, order, found = vanished(0.1, Stationarity.B, monkeypatch)
+    found.w[order.ways[0].extents] += 0.1
+    monkeypatch.setattr(p.branches, 'without_short', lambda found: p.run.point)
+    assert coincidences._order(p.run.point, order, []) is found
+
+
+@pytest.mark.parametrize('gain', [0.05, -0.05])
+def test_where_the_place_is_left_out_another_point_is_gone_on_from_if_it_is_better(gain, monkeypatch):
+    p, coincidences, order, found = vanished(0.1, Stationarity.B, monkeypatch)
+    w = p.run.point.w.copy()
+    other = replace(p.run.point, f=p.run.point.f - gain, nlp=replace(p.run.point.nlp, w=w))
+    monkeypatch.setattr(p.branches, 'without_short', lambda found: other)
+    monkeypatch.setattr(coincidences, '_is_another', lambda point, nlp: nlp is other.nlp)
+    assert coincidences._order(p.run.point, order, []) is (other if gain > 0 else found)

@@ -273,3 +273,73 @@ def test_a_completion_without_a_branch_is_judged_as_it_is():
     rounds.follow(p.compiled.x0)
     assert p.run.point.f == pytest.approx(0.75)
     assert p.run.point.certificate.grade is Stationarity.DESCENT
+
+
+@pytest.mark.parametrize('status, counts', [('User_Requested_Stop', True), ('Infeasible_Problem_Detected', False)])
+def test_what_a_relaxation_promises_counts_unless_it_is_infeasible(status, counts, monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    relax = p.subsolves.relax
+    monkeypatch.setattr(p.subsolves, 'relax', lambda *args: replace(relax(*args), status=status))
+    relaxed, _ = rounds._round(p.compiled.x0, 1e-1)
+    assert rounds._promise == (p.compiled.evaluate(relaxed.w).f if counts else -np.inf)
+
+
+def test_a_path_that_leads_away_is_the_last_one_where_nothing_better_is_promised(monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    monkeypatch.setattr(rounds, '_promising', lambda: False)
+    relax, forms = p.subsolves.relax, []
+
+    def infeasible_at_last(form, w, eps, *args):
+        forms.append(form)
+        result = relax(form, w, eps, *args)
+        return replace(result, status='Infeasible_Problem_Detected') if len(forms) == 2 else result
+
+    monkeypatch.setattr(p.subsolves, 'relax', infeasible_at_last)
+    rounds.follow(p.compiled.x0)
+    assert set(forms) == {'scholtes'} and len(forms) > 2, "relaxations go around its best point"
+
+
+def test_one_more_path_follows_at_last_once(monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    rounds.follow(p.compiled.x0)
+    forms, relax = [], p.subsolves.relax
+    monkeypatch.setattr(p.subsolves, 'relax', lambda form, *args: (forms.append(form), relax(form, *args))[1])
+    assert rounds.further(p.compiled.x0) and set(forms) == {'elastic'}
+    assert p.run.point.certificate.grade is Stationarity.B
+    assert not rounds.further(p.compiled.x0)
+
+
+def test_a_further_path_that_ends_far_above_the_incumbent_is_not_worth_certificates(monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.0, True))
+    rounds.follow(p.compiled.x0)
+    before = p.run.point = replace(p.run.point, f=0.4)
+    assert not rounds.further(p.compiled.x0), "the other minimum costs 1"
+    assert p.run.point is before
+
+
+def with_a_place_of_least_extent(complete, monkeypatch):
+    """Completions by ``complete`` whose best point counts as one with such a place."""
+    p, rounds, asked = completions(complete)
+    rounds._branch_of_completion(p.compiled.x0, 1.0)
+    rounds.run.point = replace(rounds.run.point, equal=np.zeros(0, dtype=bool))
+    monkeypatch.setattr(p.branches.neighbours, 'number_of_short', lambda w: 1)
+    return p, rounds, asked
+
+
+def test_a_point_without_places_of_least_extent_is_certified_in_the_place_of_the_best_one(monkeypatch):
+    p, rounds, _ = with_a_place_of_least_extent(lambda x: (0.3, True), monkeypatch)
+    other = rounds._judged(p.run.point)
+    monkeypatch.setattr(p.branches, 'without_short', lambda point: other)
+    rounds._certify(p.run.point)
+    assert p.run.point is other
+
+
+@pytest.mark.parametrize('is_complete', [True, False])
+def test_without_one_the_controls_of_the_best_point_are_simulated_again(is_complete, monkeypatch):
+    complete = iter([True, is_complete])
+    p, rounds, asked = with_a_place_of_least_extent(lambda x: (0.3, next(complete)), monkeypatch)
+    before = len(asked)
+    found = rounds._simulated_again(p.run.point)
+    assert len(asked) == before + 1
+    assert (found is None) == (not is_complete)
+    assert found is None or found.certificate.grade is Stationarity.B

@@ -8,6 +8,7 @@ from problems.parts import jump_inside_a_stage
 
 from pyomo_fesd.mpcc.algorithm import branch_solutions
 from pyomo_fesd.mpcc.algorithm.short_places import ShortPlaces
+from pyomo_fesd.mpcc.subproblems import Stationarity
 
 
 @pytest.mark.parametrize('cost, found', [(0.5 * branch_solutions.UNEVEN, True), (2 * branch_solutions.UNEVEN, False)])
@@ -43,3 +44,16 @@ def test_a_known_solution_with_fewer_variables_at_their_lower_bound_comes_first_
     again = replace(known, nlp=replace(known.nlp, w=known.w + 1e-12))
     monkeypatch.setattr(p.branches.solutions, 'up_to', lambda enough, suits: (one for one in [again] if suits(one.f, one.w)))
     assert places.fewer(at_bound) is not again
+
+
+def test_no_descent_is_followed_from_a_solution_that_is_not_certified(monkeypatch):
+    p = jump_inside_a_stage()
+    point, short = p.run.point, p.compiled.neighbours[0].short
+    at_bound = point.w.copy()
+    at_bound[short] = p.compiled.lbx[short]
+    other = replace(point, certificate=replace(point.certificate, grade=Stationarity.DESCENT))
+    monkeypatch.setattr(p.branches.solutions, 'certified', lambda *args, **options: other)
+    monkeypatch.setattr(p.branches.solutions, 'up_to', lambda enough, suits: iter(()))
+    monkeypatch.setattr(p.branches.neighbours, 'with_fewer_short', lambda point: [np.zeros(1, dtype=int)])
+    monkeypatch.setattr(p.branches, 'improve_from', lambda *args: pytest.fail("followed"))
+    assert ShortPlaces(p.branches).fewer(replace(point, nlp=replace(point.nlp, w=at_bound))) is None
