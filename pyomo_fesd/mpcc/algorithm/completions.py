@@ -70,7 +70,7 @@ class Completions:
         self._paths, self._further = PATHS.get(form) or tuple((form, looser) for looser in LOOSER), FURTHER.get(form)
         self._form, self._share = self._paths[0][0], 1.0
         self._deadline, self._possible = setup.deadline.part(SHARE), False
-        # objectives of the last relaxation that holds, and of the last one
+        # objectives of the last relaxation that was not infeasible, and of the last one
         self._promise, self._last = -np.inf, np.inf
         self._objectives, self._around, self._left = [], set(), None
         # the best points of the path, and of all solutions
