@@ -70,8 +70,8 @@ class Completions:
         self._paths, self._further = PATHS.get(form) or tuple((form, looser) for looser in LOOSER), FURTHER.get(form)
         self._form, self._share = self._paths[0][0], 1.0
         self._deadline, self._possible = setup.deadline.part(SHARE), False
-        # objectives of the last relaxation that was not infeasible, and of the last one
-        self._promise, self._last = -np.inf, np.inf
+        # objectives of the last relaxation that holds, or before there is one, that was not infeasible; and of the last one
+        self._promise, self._keeps_promise, self._last = -np.inf, False, np.inf
         self._objectives, self._around, self._left = [], set(), None
         # the best points of the path, and of all solutions
         self._best = self._solved = None
@@ -197,7 +197,9 @@ class Completions:
         self._subsolves.keep_least_infeasible(relaxed.w)
         if eps <= AROUND[0] * ROUND_OFF:
             self._last = self._c.evaluate(relaxed.w).f
-            self._promise = self._promise if relaxed.status in INFEASIBLE else self._last
+            holds = self._subsolves.usable(relaxed)
+            if holds or not (self._keeps_promise or relaxed.status in INFEASIBLE):
+                self._promise, self._keeps_promise = self._last, holds
         if not self._is_known(relaxed):
             seconds = max(LEAST_TIME, LONGER * (time.perf_counter() - began))
             end = self._explore(relaxed.w, seconds, is_on_the_way and not self._names_a_branch(relaxed))

@@ -284,6 +284,17 @@ def test_what_a_relaxation_promises_counts_unless_it_is_infeasible(status, count
     assert rounds._promise == (p.compiled.evaluate(relaxed.w).f if counts else -np.inf)
 
 
+def test_a_relaxation_that_was_stopped_does_not_take_back_what_one_before_has_kept(monkeypatch):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    relax, hold = p.subsolves.relax, iter([True, False])
+    monkeypatch.setattr(p.subsolves, 'relax', lambda *args: replace(relax(*args), status=STALLED))
+    monkeypatch.setattr(p.subsolves, 'usable', lambda result: next(hold, True))
+    monkeypatch.setattr(rounds, '_is_known', lambda relaxed: True)
+    first, _ = rounds._round(p.compiled.x0, 1e-1)
+    rounds._round(p.compiled.x0, 1e-2)
+    assert rounds._promise == p.compiled.evaluate(first.w).f != rounds._last
+
+
 def test_a_path_that_leads_away_is_the_last_one_where_nothing_better_is_promised(monkeypatch):
     p, rounds, _ = completions(lambda x: (0.3, True))
     monkeypatch.setattr(rounds, '_promising', lambda: False)
