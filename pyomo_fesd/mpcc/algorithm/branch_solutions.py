@@ -253,10 +253,15 @@ def _is_clear(certificate):
 
 
 def _is_same(one, other):
+    return have_same_values(one, other) and np.array_equal(one.equal, other.equal)
+
+
+def have_same_values(one, other, columns=slice(None)) -> bool:
+    """Return whether two solutions of branches are one by their objectives and the values in some ``columns``."""
     if not (one.nlp.solved and other.nlp.solved) or abs(one.f - other.f) > SAME_OBJECTIVE * max(1.0, abs(one.f)):
         return False
-    close = np.abs(one.nlp.w - other.nlp.w) <= SAME_VALUE * np.maximum(1.0, np.abs(one.nlp.w))
-    return bool(close.all()) and np.array_equal(one.equal, other.equal)
+    a, b = one.nlp.w[columns], other.nlp.w[columns]
+    return bool((np.abs(a - b) <= SAME_VALUE * np.maximum(1.0, np.abs(a))).all())
 
 
 def _is_clearly_above(f, below):

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND, as_good
+from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND, as_good, have_same_values
 from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
 from pyomo_fesd.mpcc.algorithm.orders import NEAR_BOUND, Orders, has_more_at_end, rows
 from pyomo_fesd.mpcc.algorithm.short_places import ShortPlaces
@@ -291,7 +291,12 @@ class Coincidences:
         stays = found.certificate.certified or found.certificate.grade is Stationarity.LIMITED
         are_short = bool(np.all(found.w[extents] <= self._c.lbx[extents] + NEAR_BOUND))
         alone = self._branches.neighbours.number_of_short(found.w) == len(extents)
-        return stays and are_short and alone and not self._is_another(point, even.nlp)
+        return stays and are_short and alone and have_same_values(even, point, self._of_motion())
+
+    def _of_motion(self):
+        """The extents of all places and the values with which they end; within a place some are not determined."""
+        places = self._subsolves.parts.all
+        return np.unique([k for place in places for k in (place.extent, *place.last)])
 
     def _is_another(self, point, other):
         """Whether another solution does not meet the incumbent: its places are not the same."""
@@ -304,7 +309,7 @@ class Coincidences:
     def _better(self, point, starts, zero, extents):
         """A point in the branch ``zero``, in which the places ``extents`` may grow, that is better than the incumbent; or OPEN.
 
-        SETTLED where such a point is certified, but its places have not grown, and without them it is the incumbent.
+        SETTLED where the solution of the branch leads back to the incumbent.
         """
         enough = point.f - PROGRESS * max(1.0, abs(point.f))
         most = as_good(point, None) if self._branches.solutions.at_once else point.f

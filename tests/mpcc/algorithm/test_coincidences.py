@@ -141,3 +141,12 @@ def test_where_the_place_is_left_out_another_point_is_gone_on_from_if_it_is_bett
     monkeypatch.setattr(p.branches, 'without_short', lambda found: other)
     monkeypatch.setattr(coincidences, '_is_another', lambda point, nlp: nlp is other.nlp)
     assert coincidences._order(p.run.point, order, []) is (other if gain > 0 else found)
+
+
+def test_another_motion_of_the_same_cost_settles_nothing(monkeypatch):
+    p, coincidences, order, found = vanished(0.1, Stationarity.B, monkeypatch)
+    w = p.run.point.w.copy()
+    w[coincidences._of_motion()[0]] += 1e-3
+    other = replace(p.run.point, nlp=replace(p.run.point.nlp, w=w))
+    monkeypatch.setattr(p.branches, 'without_short', lambda found: other)
+    assert coincidences._order(p.run.point, order, []) is found
