@@ -92,6 +92,14 @@ class ElementClass:
         """Begin a pass: values of the last element are no start for the first one."""
         self._values = None
 
+    def mark(self) -> list | None:
+        """Return the values of the last element."""
+        return self._values
+
+    def return_to(self, mark: list | None) -> None:
+        """Return to a mark, None to the begin of a pass."""
+        self._values = mark
+
     def find_initial_values(self, equations: ElementEquations) -> bool:
         """Find and write the values of the first time by Newton's method; returns whether it succeeded."""
         if self._stepper is None:

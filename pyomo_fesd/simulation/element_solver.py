@@ -122,6 +122,18 @@ class ElementSolver:
         """Begin a control stage: values of functions may jump with the controls."""
         self._end = replace(self._end, values=None)
 
+    def mark(self) -> tuple:
+        """Return what the next element depends on besides the values in the model."""
+        return self._end, [source.mark() for source in self._sources()], {c: c.mark() for c in self._classes.values()}
+
+    def return_to(self, mark: tuple) -> None:
+        """Return to a mark of this pass; the next element is the one of then."""
+        self._end, of_sources, of_classes = mark
+        for source, was in zip(self._sources(), of_sources):
+            source.return_to(was)
+        for element_class in self._classes.values():
+            element_class.return_to(of_classes.get(element_class))
+
     def end_pass(self) -> None:
         """Set the multipliers of the hysteresis conditions, and the variables of requirements."""
         for modes in self._hysteresis:

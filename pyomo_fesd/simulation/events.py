@@ -74,6 +74,14 @@ class HysteresisEvents:
             )
         self._active = possible[0]
 
+    def mark(self):
+        """Return the active mode."""
+        return self._active
+
+    def return_to(self, mark) -> None:
+        """Return to a mark of this pass; the largest values so far remain."""
+        self._active = mark
+
     def variables(self, label: float) -> list[VarData]:
         """Return the weights at one time that are variables of their own."""
         return [m.weights[label].expr for m in self._modes if m.weights[label].expr.is_variable_type()]
@@ -190,6 +198,14 @@ class JumpEvents:
     def begin(self) -> None:
         """Begin without a jump."""
         self._just = set()
+
+    def mark(self) -> set[str]:
+        """Return the names of the jumps at the last boundary."""
+        return self._just
+
+    def return_to(self, mark: set[str]) -> None:
+        """Return to a mark of this pass; the largest values so far remain."""
+        self._just = mark
 
     def event_functions(self, element) -> dict[str, list]:
         """Return the guards in an element by name, at every label."""

@@ -30,7 +30,7 @@ class ImpactEvents:
         self._state_jumps, self._times, self._solve = state_jumps, times, solve
         self._impacts: Impacts | None = None if state_jumps is None else state_jumps.impacts
         self._laws = [] if self._impacts is None else self._impacts.laws
-        self._sizes, self._arrived, self._collided = ZeroArrivals(), {}, False
+        self._sizes, self._collided = ZeroArrivals(), False
 
     def begin(self) -> None:
         """Begin without an impact."""
@@ -43,6 +43,14 @@ class ImpactEvents:
             self._sizes.at_least((law.name, 'rate'), size / horizon)
         if self._laws:
             self._without_impulse(0)
+
+    def mark(self) -> bool:
+        """Return whether there was an impact at the last boundary."""
+        return self._collided
+
+    def return_to(self, mark: bool) -> None:
+        """Return to a mark of this pass; the largest values so far remain."""
+        self._collided = mark
 
     def event_functions(self, element) -> dict[str, list]:
         """Return no functions: the conditions of the contact forces keep the gaps from becoming negative."""

@@ -1,7 +1,8 @@
 """Simulate all elements of a moving grid in one or more passes.
 
 In a pass every element is as long as its step-size plan says, or ends at the next switch, the end of a mode with hysteresis, or a
-jump.  Where these need more elements than a control stage has, the next pass keeps one in reserve for each of them.
+jump.  Where these need more elements than a control stage has, the next pass keeps one in reserve for each of them; it goes on from
+the beginning of this stage, as those before stay as they are.
 """
 
 import logging
@@ -36,7 +37,7 @@ class Simulation:
         self._grid = self._moving.grid
         self._progress = Progress(times.wrt, self._grid.stages, deadline)
         self._solver = ElementSolver(model, times, inputs, options, timer, self._progress, quick=quick)
-        self._simulated, self._warm = {}, False
+        self._simulated, self._warm, self._at_begin = {}, False, None
 
     def run(self) -> None:
         """Simulate all elements, and again with equal lengths between the switches found."""
@@ -58,16 +59,16 @@ class Simulation:
         self._progress.events = events
 
     def _fit_elements(self):
-        """Repeat the pass until every control stage has an element for each of its switches."""
-        expected, tried = dict.fromkeys(self._grid.stages, 0), set()
-        while True:
-            stage = self._pass(EvenSteps(dict(expected)))
-            if stage is None:
-                return
+        """Repeat the pass from each control stage that does not have an element for each of its switches."""
+        expected, tried, stages = dict.fromkeys(self._grid.stages, 0), set(), list(self._grid.stages)
+        self._begin_pass()
+        while (stage := self._simulate_stages(stages, EvenSteps(dict(expected)))) is not None:
             expected[stage] = self._expected_switches(stage)
             if tuple(expected.values()) in tried:
                 raise self._too_few_elements(stage)
             tried.add(tuple(expected.values()))
+            self._return_to(stage)
+            stages = stages[stages.index(stage) :]
 
     def _too_few_elements(self, stage):
         number = sum(map(len, self._progress.events.values()))
@@ -102,14 +103,28 @@ class Simulation:
 
     def _pass(self, plan):
         """Simulate all elements once; returns the control stage whose elements do not fit, None if all do."""
+        self._begin_pass()
+        return self._simulate_stages(self._grid.stages, plan)
+
+    def _begin_pass(self):
         self._progress.begin()
         self._solver.begin_pass()
         self._warm = False
-        for stage in self._grid.stages:
+
+    def _simulate_stages(self, stages, plan):
+        """Simulate the last ``stages`` of a pass; returns the first one whose elements do not fit, None if all do."""
+        for stage in stages:
+            self._at_begin = self._solver.mark(), self._progress.time, self._warm
             if not self._simulate_stage(stage, plan):
                 return stage
         self._solver.end_pass()
         return None
+
+    def _return_to(self, stage):
+        """Return to the beginning of the control stage that was simulated last."""
+        mark, self._progress.time, self._warm = self._at_begin
+        self._solver.return_to(mark)
+        self._progress.events[stage].clear()
 
     def _simulate_stage(self, stage, plan):
         """Simulate the elements of a control stage; returns whether they fill it."""

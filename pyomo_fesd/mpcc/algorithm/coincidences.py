@@ -44,7 +44,7 @@ class Coincidences:
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._branches, self._settled = subsolves, branches, None
         self._orders, self._short, self._tried = Orders(subsolves), ShortPlaces(branches), {}
-        self._replacements = REPLACED
+        self._replacements, self._evened = REPLACED, set()
 
     def settle(self):
         """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
@@ -53,6 +53,8 @@ class Coincidences:
             if not before.certificate.certified:
                 if not self._leads_on(before):
                     return
+                continue
+            if self._takes_even(before):
                 continue
             # until all orders are settled any certified point is better
             self.run.point = replace(before, certificate=replace(before.certificate, grade=Stationarity.OPEN))
@@ -87,6 +89,18 @@ class Coincidences:
                 self._go_on(found)
                 return True
         return self._takes_fewer_short(point)
+
+    def _takes_even(self, point):
+        """Whether a solution without places of least extent, beside a point with some, is the incumbent now, for the first time.
+
+        Beside such places orders are mostly not decided, and their branches end at these places again.
+        """
+        even = self._branches.without_short(point)
+        if even is None or even.f in self._evened:
+            return False
+        self._evened.add(even.f)
+        self.run.point = even
+        return True
 
     def _takes_fewer_short(self, point):
         """Whether there is a point with fewer places of least extent, or a better one on the way, which is the incumbent now."""

@@ -19,8 +19,8 @@ from pyomo_fesd.mpcc.subproblems import Stationarity
 
 #: Smallest eps of a relaxation that is worth a completion, and the eps of those around the best point.
 LAST, AROUND = 1e-3, (1e-1, 1e-2)
-#: Part of ``relaxation_iterations`` that a relaxation may use after one of its path has not reached its solution: then most do not,
-#: and the completion of a point on the way is as good.
+#: Part of ``relaxation_iterations`` that a relaxation may use: of those that need more most do not end at all, and the completion
+#: of a point on the way is as good.
 BUDGET = 0.4
 #: Times that relaxations go around the best point at most, and the part by which its objective must fall to go on.
 CYCLES, PROGRESS = 6, 1e-2
@@ -68,7 +68,7 @@ class Completions:
         self._subsolves, self._branches, self.run = subsolves, branches, subsolves.run
         form = self._options.relaxation
         self._paths, self._further = PATHS.get(form) or tuple((form, looser) for looser in LOOSER), FURTHER.get(form)
-        self._form, self._share = self._paths[0][0], 1.0
+        self._form, self._budget = self._paths[0][0], int(BUDGET * self._options.relaxation_iterations)
         self._deadline, self._possible = setup.deadline.part(SHARE), False
         # objectives of the last relaxation that holds, or before there is one, that was not infeasible; and of the last one
         self._promise, self._keeps_promise, self._last = -np.inf, False, np.inf
@@ -111,7 +111,7 @@ class Completions:
 
     def _follow(self, form, w, eps, is_last):
         """Follow one path from ``w``; return whether it leads away from all solutions."""
-        self._form, self._best, self._share = form, None, 1.0
+        self._form, self._best = form, None
         leads_away = self._down(w, eps, is_last)
         if is_last or not leads_away or not self._promising():
             self._improve()
@@ -192,8 +192,7 @@ class Completions:
         """
         self.run.eps, end = eps, None
         began = time.perf_counter()
-        relaxed = self._subsolves.relax(self._form, w, eps, None, int(self._share * self._options.relaxation_iterations))
-        self._share = BUDGET if relaxed.stopped else self._share
+        relaxed = self._subsolves.relax(self._form, w, eps, None, self._budget)
         self._subsolves.keep_least_infeasible(relaxed.w)
         if eps <= AROUND[0] * ROUND_OFF:
             self._last = self._c.evaluate(relaxed.w).f
@@ -268,6 +267,7 @@ class Completions:
         else:
             even = self._branches.without_short(best) or self._simulated_again(best)
             if even is not None:
+                even = self._branches.without_short(even) or even
                 self.run.point = even
                 self._branches.improve_from(even, True)
                 return

@@ -104,8 +104,8 @@ class HybridSolver:
                 return Outcome.NO_BRANCH if self.run.point is None else Outcome.FEASIBLE
             self._from_start()
             self._finish()
-            self._try_further_at_last()
             self._try_neighbours_at_last()
+            self._try_further_at_last()
             self._try_lowest_at_last()
         if self.run.point is None:
             return Outcome.INFEASIBLE
@@ -117,9 +117,14 @@ class HybridSolver:
         return self.run.point is not None and self.run.point.certificate.certified
 
     def _from_start(self):
-        """Completions or the homotopy; without a feasible point from there, a search."""
+        """Completions or the homotopy; without a feasible point from there, a search.
+
+        From a certified end of completions orders of changes lead on, and neighbouring branches only where these stay open.
+        """
         if self._complete():
             self._branches.take_certified()
+            if self._is_certified():
+                return
         else:
             self._follow_path()
         if self.run.point is not None and self._c.has_objective:
@@ -164,6 +169,7 @@ class HybridSolver:
         self._branches.forget()
         if self._completions.further(self._c.x0):
             self._finish()
+            self._try_neighbours_at_last()
 
     def _certify_at_last(self) -> bool:
         """Certify the incumbent in all the time that is left, where its LPEC was stopped early; return whether it was."""

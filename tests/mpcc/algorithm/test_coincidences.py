@@ -102,6 +102,31 @@ def test_a_point_is_replaced_by_others_with_fewer_places_of_least_extent_a_few_t
     assert len(others) == REPLACED and p.run.point.certificate.grade is Stationarity.OPEN
 
 
+@pytest.mark.parametrize('outcome', [SETTLED, OPEN])
+def test_orders_are_tried_at_the_point_without_places_of_least_extent_beside_one_with_some(outcome, monkeypatch):
+    p, coincidences, order = a_branch(lambda point: None, monkeypatch)
+    before, even, tried = p.run.point, replace(p.run.point, f=p.run.point.f + 1e-3), []
+    monkeypatch.setattr(p.branches, 'without_short', lambda point: even if point is before else None)
+    monkeypatch.setattr(coincidences, '_outcome', lambda point: tried.append(point.f) or outcome)
+    monkeypatch.setattr(coincidences._short, 'fewer', lambda point: None)
+    coincidences.settle()
+    assert tried == [even.f] and p.run.point.f == even.f
+
+
+def test_where_an_order_leads_back_from_that_point_those_of_the_other_one_are_tried_too(monkeypatch):
+    p, coincidences, order = a_branch(lambda point: None, monkeypatch)
+    before, even, tried = p.run.point, replace(p.run.point, f=p.run.point.f + 1e-3), []
+
+    def outcome(point):
+        tried.append(point.f)
+        return before if point.f == even.f else SETTLED
+
+    monkeypatch.setattr(p.branches, 'without_short', lambda point: None if point.f == even.f else even)
+    monkeypatch.setattr(coincidences, '_outcome', outcome)
+    coincidences.settle()
+    assert tried == [even.f, before.f] and p.run.point.certificate.certified
+
+
 def vanished(gain, grade, monkeypatch):
     """The Parts, Coincidences and order of a branch whose solution, better by ``gain``, has its place at the least extent."""
     p, coincidences, order = a_branch(lambda point: found, monkeypatch)
