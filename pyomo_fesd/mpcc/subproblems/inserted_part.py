@@ -180,12 +180,12 @@ class InsertedPart:
 
     def _equations(self, w, all_free=False):
         """Rows that are equations of variables to determine, or of any; variables that are fixed, and their values."""
-        J = self._c.stacked_jacobian(w)
-        rows = self._rows
+        J, values, rows = self._c.stacked_jacobian(w), self._values(w), self._rows
+        pattern = with_entries(J[: self._m], np.ones(J.indptr[self._m]))
         equations = rows[self._low[rows] == self._high[rows]].tolist()
         fixed = {}
         for row in rows[self._zero_rows[rows]]:
-            of_rows, of_variables = self._parts_of_sum(J, w, row)
+            of_rows, of_variables = self._parts_of_sum(J, pattern, values, w, row)
             equations += of_rows
             fixed |= of_variables
         own = set(self._columns.tolist())
@@ -197,21 +197,22 @@ class InsertedPart:
         has_free = abs(J[equations]) @ free.astype(float) > 0
         return equations[has_free], np.array(list(fixed), dtype=int), np.array(list(fixed.values()))
 
-    def _parts_of_sum(self, J, w, row):
-        """Rows at 0 and variables at bounds of which a zero side is a sum; the row itself if it is not."""
+    def _parts_of_sum(self, J, pattern, values, w, row):
+        """Rows at 0 and variables at bounds of which a zero side is a sum; the row itself if it is not.
+
+        ``pattern`` is that of the model's own rows.
+        """
         entries, m = J[row], self._m
-        columns, inside = entries.indices, np.zeros(J.shape[1], dtype=bool)
-        inside[columns] = True
-        support = np.diff(J.indptr[: m + 1])
-        among = np.flatnonzero(
-            (support > 0) & (with_entries(J[:m], np.ones(J[:m].nnz)) @ inside.astype(float) == support) & np.isfinite(self._low[:m])
-        )
+        columns, inside = entries.indices, np.zeros(J.shape[1], dtype=float)
+        inside[columns] = 1.0
+        support = np.diff(pattern.indptr)
+        among = np.flatnonzero((support > 0) & (pattern @ inside == support) & np.isfinite(self._low[:m]))
         among = among[self._low[among] < self._high[among]]
         lower, upper = (columns[np.isfinite(bound[columns])] for bound in (self._c.lbx, self._c.ubx))
-        unit = sparse.identity(J.shape[1], format='csr')[:, columns]
-        basis = sparse.vstack([J[among][:, columns], unit[lower], -unit[upper]]).toarray().T
+        unit = np.eye(len(columns))
+        of_bounds = [unit[np.isfinite(self._c.lbx[columns])], -unit[np.isfinite(self._c.ubx[columns])]]
+        basis = np.vstack([J[among][:, columns].toarray(), *of_bounds]).T
         weights, left = nnls(basis, entries.data) if basis.shape[1] else (np.zeros(0), np.inf)
-        values = self._values(w)
         terms = np.concatenate([values[among] - self._low[among], w[lower] - self._c.lbx[lower], self._c.ubx[upper] - w[upper]])
         constant = values[row] - weights @ terms if len(weights) else np.inf
         if max(left, abs(constant)) > EXACT * max(1.0, np.abs(entries.data).max(initial=0.0), np.abs(w[columns]).max(initial=0.0)):
