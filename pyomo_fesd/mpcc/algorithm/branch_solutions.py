@@ -82,7 +82,6 @@ class BranchSolutions:
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
         self.at_once, self._known, self._certified = at_once and self._c.eta.numel() > 0, {}, defaultdict(list)
-        self._beside = {}
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -233,17 +232,10 @@ class BranchSolutions:
     def beside(self, w, **more):
         """The result, usable or not, of the branch NLP that ``w`` names with the decisions in force there, and these.
 
-        ``w`` is exactly complementary, and its decisions hold.  None if the bounds of the branch contradict each other.  A branch
-        that was solved so is not solved again: most motions without contact are in the same one.
+        ``w`` is exactly complementary, and its decisions hold.  None if the bounds of the branch contradict each other.
         """
         zero = self._subsolves.sets(w, self._tolerances.biactive).zero
-        key = hash((zero.tobytes(), (self._c.evaluate(w).eta > self._tolerances.eta).tobytes(), self._bounds()))
-        if key not in self._beside:
-            found = self.imposed(w, zero, True, self._subsolves.attempt, stalls=self._stalls(**more), **more)
-            if found[0] is None or not found[0].solved:
-                return found
-            self._beside[key] = found
-        return self._beside[key]
+        return self.imposed(w, zero, True, self._subsolves.attempt, stalls=self._stalls(**more), **more)
 
     def imposed(self, w, zero, among, solve, **more):
         """A branch NLP from ``w`` with the decisions that its eta asks for, ``among`` some; a tentative one only if it can be."""

@@ -314,7 +314,7 @@ class Branches:
         sets = self._subsolves.sets(w, self._tolerances.biactive)
         for _ in range(times):
             radius *= SHRINK
-            step = self._subsolves.lpec(w, sets, radius, point.equal)
+            step = self._subsolves.lpec(w, sets, radius, point.equal, limits=self._subsolves.patience())
             if not step.solved or step.descent == 0.0:
                 return None
             reach = radius * np.maximum(1.0, np.abs(w))

@@ -45,6 +45,8 @@ class Coincidences:
         self._subsolves, self._branches, self._settled = subsolves, branches, None
         self._orders, self._short, self._tried = Orders(subsolves), ShortPlaces(branches), {}
         self._replacements, self._evened = REPLACED, set()
+        # whether branches of orders are first solved with places of no extent, as this has led on where places as they are did not
+        self._from_none = False
 
     def settle(self):
         """Try all orders of the incumbent, and of each better point found; mark it if one remains open."""
@@ -188,10 +190,7 @@ class Coincidences:
         if verdicts & SETTLING:
             return SETTLED
         inserts = bool(verdicts - {Verdict.NONE})
-        better = self._grown(point, order.ways) if inserts and goes_on else None
-        if better is not None:
-            return better
-        found = self._first(partial(self._try, point, inserts), order.ways)
+        found = self._search(point, order.ways, inserts, inserts and goes_on)
         if found is SETTLED and Verdict.DESCENT in verdicts:
             # a spare place is known to the tolerances of its NLP only: a slide with rates of round-off seems to have no room
             return OPEN
@@ -200,6 +199,19 @@ class Coincidences:
             # there is no other
             return OPEN if inserts else SETTLED
         return found
+
+    def _search(self, point, ways, inserts, may_grow):
+        """A better point in the branches of some ways, or their outcome; the search that has led on last comes first."""
+        better = self._grown(point, ways) if may_grow and not self._from_none else None
+        if better is not None:
+            return better
+        found = self._first(partial(self._try, point, inserts), ways)
+        if not isinstance(found, str):
+            self._from_none = may_grow
+        elif may_grow and self._from_none:
+            better = self._grown(point, ways)
+            self._from_none = better is None
+        return found if better is None else better
 
     def _is_flat(self, point):
         """Whether no direction descends, whatever the constraints."""

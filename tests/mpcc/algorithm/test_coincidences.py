@@ -102,6 +102,33 @@ def test_a_point_is_replaced_by_others_with_fewer_places_of_least_extent_a_few_t
     assert len(others) == REPLACED and p.run.point.certificate.grade is Stationarity.OPEN
 
 
+def test_the_search_that_has_led_on_last_comes_first(monkeypatch):
+    p, coincidences, order = a_branch(lambda point: None, monkeypatch)
+    point, asked, leads_on = p.run.point, [], 'none'
+    better = replace(point, f=point.f - 0.1)
+
+    def grown(point, ways):
+        asked.append('present')
+        return better if leads_on == 'present' else None
+
+    def from_none(point, inserts, way):
+        asked.append('none')
+        return better if leads_on == 'none' else OPEN
+
+    monkeypatch.setattr(coincidences, '_grown', grown)
+    monkeypatch.setattr(coincidences, '_try', from_none)
+    for leads_on, expected in (
+        ('none', ['present', 'none']),
+        ('none', ['none']),
+        ('present', ['none', 'present']),
+        ('present', ['present']),
+        ('nothing', ['present', 'none']),
+    ):
+        asked.clear()
+        assert coincidences._order(point, order, []) is (OPEN if leads_on == 'nothing' else better)
+        assert asked == expected
+
+
 @pytest.mark.parametrize('outcome', [SETTLED, OPEN])
 def test_orders_are_tried_at_the_point_without_places_of_least_extent_beside_one_with_some(outcome, monkeypatch):
     p, coincidences, order = a_branch(lambda point: None, monkeypatch)

@@ -74,12 +74,6 @@ def test_where_the_best_point_is_not_certified_the_best_solution_is():
     assert p.run.point.certificate.grade is Stationarity.B and p.run.point.f == pytest.approx(1.0)
 
 
-def test_a_branch_that_a_completion_has_led_to_is_solved_once():
-    p, rounds, _ = completions(lambda x: (0.3, True))
-    ends = [rounds._branch_of_completion(p.compiled.x0, 1.0) for _ in range(2)]
-    assert ends == [pytest.approx(0.5)] * 2 and len(p.kinds('branch')) == 1
-
-
 def to_other_branches():
     """Completions whose branches have objectives of their own."""
     p, rounds, asked = completions(lambda x: (0.3, True))
@@ -173,12 +167,21 @@ def test_no_relaxation_follows_an_infeasible_one(monkeypatch):
     assert len(p.kinds('relaxation')) == 1
 
 
-def test_all_relaxations_have_a_part_of_the_iterations(monkeypatch):
+def test_after_a_relaxation_that_was_stopped_all_others_have_fewer_iterations(monkeypatch):
     p, rounds, _ = to_other_branches()
     relax, given = p.subsolves.relax, []
-    monkeypatch.setattr(p.subsolves, 'relax', lambda *args: (given.append(args[-1]), relax(*args))[1])
-    rounds._down(p.compiled.x0, 1.0)
-    assert given == [500 * BUDGET] * 4
+
+    def stopped_at_the_second_eps(form, w, eps, duals, most):
+        given.append(most)
+        result = relax(form, w, eps, duals, most)
+        return replace(result, status='User_Requested_Stop') if len(given) == 2 else result
+
+    monkeypatch.setattr(p.subsolves, 'relax', stopped_at_the_second_eps)
+    rounds._follow('scholtes', p.compiled.x0, 1.0, False)
+    assert given[:4] == [500, 500, 500 * BUDGET, 500 * BUDGET]
+    given.clear()
+    rounds._follow('elastic', p.compiled.x0, 1.0, True)
+    assert set(given) == {500 * BUDGET}
 
 
 def test_a_path_that_ends_infeasible_is_followed_by_one_of_the_other_form(monkeypatch):
