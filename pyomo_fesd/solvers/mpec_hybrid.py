@@ -103,7 +103,8 @@ class MpecHybrid(CasadiSolver):
         -------
         Results
             Pyomo's, and in ``extra_info``: ``outcome`` (a sentence), ``stationarity`` ('B' or 'not certified'), ``reason``,
-            ``violation``, ``complementarity`` (absolute and ``_scaled``), ``biactive_pairs``, ``nlps``, ``nlp_iterations``,
+            ``violation``, ``complementarity`` (absolute and ``_scaled``), ``lower_objective`` (of a feasible point that is clearly
+            lower than the certified one but not certified, or None), ``biactive_pairs``, ``nlps``, ``nlp_iterations``,
             ``lpecs``, ``binaries``, ``eps_last``, ``pairs``, ``missing_values``, ``violated`` (by name), ``steps``, ``starts``,
             ``warnings`` (post-solve diagnostics of a solution on moving elements)
 

@@ -40,7 +40,8 @@ def combine(total, c, ended, requested, interrupted):
     total.counts = _summed([run.counts for _, run in runs])
     if runs:
         best = _best(c, runs)
-        total.outcome, total.w, total.point, total.eps, total.steps = best.outcome, best.w, best.point, best.eps, best.steps
+        for name in ('outcome', 'w', 'point', 'lowest', 'eps', 'steps'):
+            setattr(total, name, getattr(best, name))
     total.outcome = _outcome(total.outcome, {run.outcome for _, run in runs}, ended, requested, interrupted)
 
 

@@ -30,6 +30,9 @@ CONDITIONS = {
 WITHOUT_POINT = (Outcome.NO_BRANCH, Outcome.INFEASIBLE, Outcome.TIME_LIMIT, Outcome.ITERATION_LIMIT)
 #: Measures of a certificate, None without one.
 MEASURES = ('violation', 'complementarity', 'violation_scaled', 'complementarity_scaled')
+#: A feasible point that is not certified is told of if its objective is lower by this part: smaller differences may be the error of
+#: the method's own variables.
+CLEARLY_LOWER = 2e-2
 #: Number of violated pairs and rows that a report names.
 NAMED = 5
 
@@ -63,6 +66,9 @@ def fill_results(results, model, run, loaded, compiled=None, reason='', names=la
         if run.point is not None and compiled.has_objective:
             results.incumbent_objective = compiled.objective(compiled.evaluate(run.point.w).f)
     _fill_certificate(info, certificate)
+    info.lower_objective = None if compiled is None else _lower_objective(compiled, run)
+    if info.lower_objective is not None:
+        info.reason += f"; a feasible point with objective {info.lower_objective:.7g} was found too, but is not certified"
     info.violated = _violated(compiled, run, partial(names, model))
     if info.violated:
         reason = 'largest violations: ' + ', '.join(f'{name} ({amount:.1e})' for name, amount in info.violated)
@@ -75,6 +81,16 @@ def _fill_certificate(info, certificate):
     info.biactive_pairs = getattr(certificate, 'biactive', None)
     for name in MEASURES:
         setattr(info, name, getattr(certificate, name, None))
+
+
+def _lower_objective(compiled, run):
+    """The objective of the lowest feasible point where a certified one clearly above it is the result, else None."""
+    point, lowest = run.point, run.lowest
+    if point is None or lowest is None or not point.certificate.certified:
+        return None
+    if point.f - lowest.f <= CLEARLY_LOWER * max(1.0, abs(lowest.f)):
+        return None
+    return compiled.objective(compiled.evaluate(lowest.w).f)
 
 
 def _status_of(run):

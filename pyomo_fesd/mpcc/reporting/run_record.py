@@ -17,7 +17,7 @@ from pyomo_fesd.mpcc.reporting.pyomo_results import MEASURES
 PACKAGES = ('pyomo', 'casadi', 'highspy', 'numpy', 'scipy')
 #: Entries of ``results.extra_info`` in the record.
 INFO = (
-    *('outcome', 'stationarity', 'reason', *MEASURES, 'biactive_pairs', 'missing_values'),
+    *('outcome', 'stationarity', 'reason', 'lower_objective', *MEASURES, 'biactive_pairs', 'missing_values'),
     *('nlps', 'nlp_iterations', 'lpecs', 'binaries', 'eps_last', 'violated'),
 )
 #: Fields of a LogEntry in the record; the point would make the file large.

@@ -9,6 +9,7 @@ import pytest
 from problems import small_mpccs
 from problems.parts import parts
 
+from pyomo_fesd.mpcc.algorithm import completions as module
 from pyomo_fesd.mpcc.algorithm.completions import AROUND, BUDGET, Completions
 from pyomo_fesd.mpcc.nlp import STALLED
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
@@ -182,6 +183,15 @@ def test_after_a_relaxation_that_was_stopped_all_others_have_fewer_iterations(mo
     given.clear()
     rounds._follow('elastic', p.compiled.x0, 1.0, True)
     assert set(given) == {500 * BUDGET}
+
+
+def test_with_many_variables_all_have_fewer(monkeypatch):
+    monkeypatch.setattr(module, 'MANY', 1)
+    p, rounds, _ = to_other_branches()
+    relax, given = p.subsolves.relax, []
+    monkeypatch.setattr(p.subsolves, 'relax', lambda *args: (given.append(args[-1]), relax(*args))[1])
+    rounds._down(p.compiled.x0, 1.0)
+    assert given == [500 * BUDGET] * 4
 
 
 def test_a_path_that_ends_infeasible_is_followed_by_one_of_the_other_form(monkeypatch):
