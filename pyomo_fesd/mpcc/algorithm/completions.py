@@ -19,9 +19,9 @@ from pyomo_fesd.mpcc.subproblems import Stationarity
 
 #: Smallest eps of a relaxation that is worth a completion, and the eps of those around the best point.
 LAST, AROUND = 1e-3, (1e-1, 1e-2)
-#: Part of ``relaxation_iterations`` that a relaxation may use after one has not reached its solution, and from the first one on with
-#: so many variables: then most that need more do not end at all, and the completion of a point on the way is as good.  With few
-#: variables all iterations cost little, and 200 to 400 have led to the best points.
+#: Part of ``relaxation_iterations`` that a relaxation may use after one has not reached its solution, and from the first one on
+#: with so many variables: then most that need more do not end at all, and the completion of a point on the way is as good.  With
+#: few variables all iterations cost little, and 200 to 400 have led to the best points.
 BUDGET, MANY = 0.4, 1000
 #: Times that relaxations go around the best point at most, and the part by which its objective must fall to go on.
 CYCLES, PROGRESS = 6, 1e-2
