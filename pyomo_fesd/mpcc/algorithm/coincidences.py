@@ -44,7 +44,7 @@ class Coincidences:
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._branches, self._settled = subsolves, branches, None
         self._orders, self._short, self._tried = Orders(subsolves), ShortPlaces(branches), {}
-        self._replacements, self._evened = REPLACED, set()
+        self._replacements = REPLACED
         # whether branches of orders are first solved with places of no extent, as this has led on where places as they are did not
         self._from_none = False
 
@@ -93,14 +93,13 @@ class Coincidences:
         return self._takes_fewer_short(point)
 
     def _takes_even(self, point):
-        """Whether a solution without places of least extent, beside a point with some, is the incumbent now, for the first time.
+        """Whether a solution without places of least extent, beside a point with some, is the incumbent now, whose orders are new.
 
         Beside such places orders are mostly not decided, and their branches end at these places again.
         """
         even = self._branches.without_short(point)
-        if even is None or even.f in self._evened:
+        if even is None or self._short.is_left_out(even.f):
             return False
-        self._evened.add(even.f)
         self.run.point = even
         return True
 

@@ -45,6 +45,10 @@ class ShortPlaces:
         """Do not return this point: its orders have been tried, and one of them may lead to the point that asks for another."""
         self._left_out.append(point.f)
 
+    def is_left_out(self, f) -> bool:
+        """Whether the orders of a point with this objective have been tried."""
+        return any(abs(f - other) <= SAME * max(1.0, abs(f)) for other in self._left_out)
+
     def fewer(self, point):
         """A certified point in such a branch, or in one without any of them, with fewer variables at their lower bound; or None.
 
@@ -61,8 +65,7 @@ class ShortPlaces:
 
     def _is_new_with_fewer(self, number, f, w):
         """Whether a point is not left out, and has fewer variables at their lower bound than a ``number``."""
-        is_left_out = any(abs(f - other) <= SAME * max(1.0, abs(f)) for other in self._left_out)
-        return not is_left_out and self._neighbours.number_of_short(w) < number
+        return not self.is_left_out(f) and self._neighbours.number_of_short(w) < number
 
     def _beside(self, point, enough, number):
         """A certified point with less than a ``number`` of these variables, in a branch beside ``point``."""
