@@ -1,29 +1,16 @@
 """A linear program that is solved again and again, with other upper bounds of its rows, each time from the last basis.
 
-HiGHS gets it without the columns that stay 0, and without the rows that have no others: about a fifth of an LPEC.
-
 Takes: a program without binaries.
 Leaves: its optimum; or a point and multipliers as HiGHS gave them, of which nothing is promised.
 """
 
 from dataclasses import replace
-from functools import cached_property
 from itertools import cycle
 
 import highspy
 import numpy as np
 
-from pyomo_fesd.mpcc.subproblems.linear_program import (
-    ATTEMPTS,
-    Answer,
-    Program,
-    highs_of,
-    holds,
-    run,
-    set_options,
-    settings_of,
-    solve,
-)
+from pyomo_fesd.mpcc.subproblems.linear_program import ATTEMPTS, Answer, highs_of, holds, run, set_options, settings_of, solve
 
 #: Iterations of the simplex method before the next attempt, for each row and column: without a basis, and from the last one.
 FIRST, AGAIN = 1.0, 0.1
@@ -57,8 +44,6 @@ class RepeatedProgram:
     def __init__(self, program, options, deadline):
         self._given, self._options, self._deadline = program, options, deadline
         self._p, self._rows, self._factor = program.equilibrated()
-        self._kept_rows, self._kept_columns = _kept(self._p)
-        self._place_of_row = np.cumsum(self._kept_rows) - 1
         self._high, self._limit, self._ways = self._p.high, FIRST, cycle(WAYS)
         self._highs, self._basis = self._made(next(self._ways)), None
 
@@ -82,7 +67,7 @@ class RepeatedProgram:
         if self._deadline.at is not None:
             # the limit is one of all runs together
             self._highs.setOptionValue('time_limit', self._highs.getRunTime() + self._deadline.left())
-        self._highs.setOptionValue('simplex_iteration_limit', int(self._limit * sum(self._reduced.A.shape)))
+        self._highs.setOptionValue('simplex_iteration_limit', int(self._limit * sum(self._p.A.shape)))
         if self._ends_well(self._highs):
             self._limit, self._basis = AGAIN, self._highs.getBasis()
             return self._answer(self._highs)
@@ -105,7 +90,7 @@ class RepeatedProgram:
 
     def _otherwise(self):
         for settings in OTHERWISE:
-            highs = self._made({'simplex_iteration_limit': int(FIRST * sum(self._reduced.A.shape))} | settings)
+            highs = self._made({'simplex_iteration_limit': int(FIRST * sum(self._p.A.shape))} | settings)
             self._change(highs, np.flatnonzero(self._high != self._p.high))
             self._ends_well(highs)
             answer = self._answer(highs)
@@ -114,18 +99,11 @@ class RepeatedProgram:
         return None
 
     def _made(self, settings):
-        return highs_of(self._reduced, settings_of(ATTEMPTS[0], 0, self._deadline, settings | self._options))
-
-    @cached_property
-    def _reduced(self):
-        """The program without columns that stay 0, and without rows that have no others."""
-        p, rows, columns = self._p, self._kept_rows, self._kept_columns
-        of_rows, of_columns = (p.low[rows], p.high[rows]), (p.lower[columns], p.upper[columns], p.reach[columns])
-        return Program(p.cost[columns], p.A[:, columns][rows], *of_rows, *of_columns)
+        return highs_of(self._p, settings_of(ATTEMPTS[0], 0, self._deadline, settings | self._options))
 
     def _change(self, highs, rows):
-        for i in rows[self._kept_rows[rows]]:
-            highs.changeRowBounds(int(self._place_of_row[i]), self._p.low[i], self._high[i])
+        for i in rows:
+            highs.changeRowBounds(int(i), self._p.low[i], self._high[i])
 
     @staticmethod
     def _ends_well(highs):
@@ -136,16 +114,5 @@ class RepeatedProgram:
         solution = highs.getSolution()
         if not (solution.value_valid and solution.dual_valid):
             return None
-        d, y = np.zeros(len(self._kept_columns)), np.zeros(len(self._kept_rows))
-        d[self._kept_columns], y[self._kept_rows] = solution.col_value, solution.row_dual
-        d, y = d * self._given.reach, y * self._rows / self._factor
+        d, y = np.array(solution.col_value) * self._given.reach, np.array(solution.row_dual) * self._rows / self._factor
         return Answer(d, y) if np.isfinite(d).all() and np.isfinite(y).all() else None
-
-
-def _kept(p):
-    """The rows and columns without which a program would be another one; all of them where every column stays 0."""
-    moves = (p.lower < p.upper) | (p.lower != 0.0)
-    if not moves.any():
-        return np.ones(len(p.low), dtype=bool), np.ones(len(p.cost), dtype=bool)
-    entries = np.bincount(p.A.indices, np.repeat(moves, np.diff(p.A.indptr)), minlength=len(p.low))
-    return entries > 0, moves
