@@ -44,7 +44,8 @@ class Coincidences:
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._branches, self._settled = subsolves, branches, None
         self._orders, self._short, self._tried = Orders(subsolves), ShortPlaces(branches), {}
-        self._replacements = REPLACED
+        # the point with places of least extent that was left last for a solution without them
+        self._replacements, self._left = REPLACED, None
         # whether branches of orders are first solved with places of no extent, as this has led on where places as they are did not
         self._from_none = False
 
@@ -62,11 +63,12 @@ class Coincidences:
             self.run.point = replace(before, certificate=replace(before.certificate, grade=Stationarity.OPEN))
             self._short.leave_out(before)
             found = self._outcome_once(before)
-            if found is OPEN and self._takes_fewer_short(before):
+            if found is OPEN and (self._returns() or self._takes_fewer_short(before)):
                 continue
             if found is SETTLED:
                 self.run.point = self._settled = before
             elif found is not OPEN:
+                self._left = None
                 self._go_on(found)
             if found in (SETTLED, OPEN):
                 return
@@ -100,8 +102,15 @@ class Coincidences:
         even = self._branches.without_short(point)
         if even is None or self._short.is_left_out(even.f):
             return False
-        self.run.point = even
+        self.run.point, self._left = even, point
         return True
+
+    def _returns(self):
+        """Whether the point that was left for an even solution, of which orders stay open, is the incumbent again."""
+        point, self._left = self._left, None
+        if point is not None:
+            self.run.point = point
+        return point is not None
 
     def _takes_fewer_short(self, point):
         """Whether there is a point with fewer places of least extent, or a better one on the way, which is the incumbent now."""

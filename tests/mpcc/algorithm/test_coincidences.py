@@ -129,15 +129,17 @@ def test_the_search_that_has_led_on_last_comes_first(monkeypatch):
         assert asked == expected
 
 
-@pytest.mark.parametrize('outcome', [SETTLED, OPEN])
-def test_orders_are_tried_at_the_point_without_places_of_least_extent_beside_one_with_some(outcome, monkeypatch):
+@pytest.mark.parametrize('outcome, of_other', [(SETTLED, SETTLED), (OPEN, SETTLED), (OPEN, OPEN)])
+def test_orders_are_tried_first_at_the_point_without_places_of_least_extent_beside_one_with_some(outcome, of_other, monkeypatch):
     p, coincidences, order = a_branch(lambda point: None, monkeypatch)
     before, even, tried = p.run.point, replace(p.run.point, f=p.run.point.f + 1e-3), []
     monkeypatch.setattr(p.branches, 'without_short', lambda point: even if point is before else None)
-    monkeypatch.setattr(coincidences, '_outcome', lambda point: tried.append(point.f) or outcome)
+    outcomes = {even.f: outcome, before.f: of_other}
+    monkeypatch.setattr(coincidences, '_outcome', lambda point: tried.append(point.f) or outcomes[point.f])
     monkeypatch.setattr(coincidences._short, 'fewer', lambda point: None)
     coincidences.settle()
-    assert tried == [even.f] and p.run.point.f == even.f
+    assert tried == ([even.f] if outcome is SETTLED else [even.f, before.f])
+    assert p.run.point.certificate.certified == (SETTLED in (outcome, of_other))
 
 
 def test_where_an_order_leads_back_from_that_point_those_of_the_other_one_are_tried_too(monkeypatch):
