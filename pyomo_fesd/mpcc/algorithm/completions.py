@@ -19,10 +19,9 @@ from pyomo_fesd.mpcc.subproblems import Stationarity
 
 #: Smallest eps of a relaxation that is worth a completion, and the eps of those around the best point.
 LAST, AROUND = 1e-3, (1e-1, 1e-2)
-#: Part of ``relaxation_iterations`` that a relaxation may use after one has not reached its solution, and from the first one on
-#: with so many variables: then most that need more do not end at all, and the completion of a point on the way is as good.  With
-#: few variables all iterations cost little, and 200 to 400 have led to the best points.
-BUDGET, MANY = 0.4, 1000
+#: Part of ``relaxation_iterations`` that the first relaxation may use, and all others after one that has not reached its solution:
+#: then most do not, and the completion of a point on the way is as good.
+BUDGET = 0.4
 #: Times that relaxations go around the best point at most, and the part by which its objective must fall to go on.
 CYCLES, PROGRESS = 6, 1e-2
 #: option ``relaxation`` -> paths: the form of their relaxations, and their first eps relative to the option ``eps_init``.  Bounds
@@ -69,7 +68,7 @@ class Completions:
         self._subsolves, self._branches, self.run = subsolves, branches, subsolves.run
         form = self._options.relaxation
         self._paths, self._further = PATHS.get(form) or tuple((form, looser) for looser in LOOSER), FURTHER.get(form)
-        self._form, self._share = self._paths[0][0], 1.0 if len(self._c.x0) < MANY else BUDGET
+        self._form, self._share, self._all_end = self._paths[0][0], BUDGET, True
         self._deadline, self._possible = setup.deadline.part(SHARE), False
         # objectives of the last relaxation that holds, or before there is one, that was not infeasible; and of the last one
         self._promise, self._keeps_promise, self._last = -np.inf, False, np.inf
@@ -194,7 +193,8 @@ class Completions:
         self.run.eps, end = eps, None
         began = time.perf_counter()
         relaxed = self._subsolves.relax(self._form, w, eps, None, int(self._share * self._options.relaxation_iterations))
-        self._share = BUDGET if relaxed.stopped else self._share
+        self._all_end = self._all_end and not relaxed.stopped
+        self._share = 1.0 if self._all_end else BUDGET
         self._subsolves.keep_least_infeasible(relaxed.w)
         if eps <= AROUND[0] * ROUND_OFF:
             self._last = self._c.evaluate(relaxed.w).f
