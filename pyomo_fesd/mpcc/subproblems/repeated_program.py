@@ -1,5 +1,8 @@
 """A linear program that is solved again and again, with other upper bounds of its rows, each time from the last basis.
 
+Columns that stay 0 remain in it: without them HiGHS gives other multipliers of the same optimum, whose relative descent may be many
+times larger.
+
 Takes: a program without binaries.
 Leaves: its optimum; or a point and multipliers as HiGHS gave them, of which nothing is promised.
 """
