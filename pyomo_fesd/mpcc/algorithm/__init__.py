@@ -9,6 +9,7 @@ every order of changes that fall together) with ``orders`` (which there are), ``
 (limits, times and log of each NLP and LPEC), ``start_points``.
 """
 
+from pyomo_fesd.mpcc.algorithm.branch_solutions import as_good
 from pyomo_fesd.mpcc.algorithm.feasible_start import is_exact
 from pyomo_fesd.mpcc.algorithm.hybrid import HybridSolver
 from pyomo_fesd.mpcc.algorithm.start_points import start_point

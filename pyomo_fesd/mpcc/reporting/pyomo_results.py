@@ -10,7 +10,7 @@ from pyomo.contrib.solver.common.solution_loader import SolutionLoader
 from pyomo.contrib.solver.common.util import NoDualsError, NoReducedCostsError, NoSolutionError
 from pyomo.core.staleflag import StaleFlagManager
 
-from pyomo_fesd.mpcc.algorithm import Outcome
+from pyomo_fesd.mpcc.algorithm import Outcome, as_good
 
 #: Each outcome as Pyomo's termination condition and status; for an unknown status the best point decides.
 CONDITIONS = {
@@ -30,9 +30,6 @@ CONDITIONS = {
 WITHOUT_POINT = (Outcome.NO_BRANCH, Outcome.INFEASIBLE, Outcome.TIME_LIMIT, Outcome.ITERATION_LIMIT)
 #: Measures of a certificate, None without one.
 MEASURES = ('violation', 'complementarity', 'violation_scaled', 'complementarity_scaled')
-#: A feasible point that is not certified is told of if its objective is lower by this part: smaller differences may be the error of
-#: the method's own variables.
-CLEARLY_LOWER = 2e-2
 #: Number of violated pairs and rows that a report names.
 NAMED = 5
 
@@ -84,11 +81,9 @@ def _fill_certificate(info, certificate):
 
 
 def _lower_objective(compiled, run):
-    """The objective of the lowest feasible point where a certified one clearly above it is the result, else None."""
+    """The objective of the lowest feasible point where a certified one that is not ``as_good`` is the result, else None."""
     point, lowest = run.point, run.lowest
-    if point is None or lowest is None or not point.certificate.certified:
-        return None
-    if point.f - lowest.f <= CLEARLY_LOWER * max(1.0, abs(lowest.f)):
+    if point is None or lowest is None or not point.certificate.certified or point.f <= as_good(lowest, None):
         return None
     return compiled.objective(compiled.evaluate(lowest.w).f)
 
