@@ -325,12 +325,7 @@ class Coincidences:
         stays = found.certificate.certified or found.certificate.grade is Stationarity.LIMITED
         are_short = bool(np.all(found.w[extents] <= self._c.lbx[extents] + NEAR_BOUND))
         alone = self._branches.neighbours.number_of_short(found.w) == len(extents)
-        return stays and are_short and alone and have_same_values(even, point, self._of_motion())
-
-    def _of_motion(self):
-        """The extents of all places and the values with which they end; within a place some are not determined."""
-        places = self._subsolves.parts.all
-        return np.unique([k for place in places for k in (place.extent, *place.last)])
+        return stays and are_short and alone and have_same_values(even, point, self._subsolves.parts.motion)
 
     def _is_another(self, point, other):
         """Whether another solution does not meet the incumbent: its places are not the same."""

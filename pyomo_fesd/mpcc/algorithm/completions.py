@@ -80,7 +80,7 @@ class Completions:
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
         for form, looser in self._paths:
             is_last = (form, looser) == self._paths[-1]
-            leads_away = self._follow(form, start, self._options.eps_init * looser, is_last)
+            leads_away = not self._leads_on(form) and self._follow(form, start, self._options.eps_init * looser, is_last)
             if not (self._possible or leads_away) or not self._promising() or self._deadline.expired():
                 break
         if self._left is not None and self._possible and self._is_far_below(self._last):
@@ -108,6 +108,18 @@ class Completions:
         (form, looser), self._further = self._further, None
         self._follow(form, start, self._options.eps_init * looser, True)
         return True
+
+    def _leads_on(self, form):
+        """Whether relaxations of another form lead on from the best point of a path that was left.
+
+        From the start they would reach their solutions no better than those of this path.
+        """
+        before = self._best
+        if self._left is None or before is None:
+            return False
+        self._form = form
+        self._improve()
+        return self._best_is_below(before)
 
     def _follow(self, form, w, eps, is_last):
         """Follow one path from ``w``; return whether it leads away from all solutions."""
@@ -146,8 +158,11 @@ class Completions:
             if before is None:
                 return
             self._cycle()
-            if not self._best.f < before.f - PROGRESS * max(1.0, abs(before.f)):
+            if not self._best_is_below(before):
                 return
+
+    def _best_is_below(self, before):
+        return self._best.f < before.f - PROGRESS * max(1.0, abs(before.f))
 
     def _cycle(self):
         """A round for each eps from the best point; and one on from the first relaxation, where all of these only promise more."""

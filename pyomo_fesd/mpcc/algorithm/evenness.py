@@ -10,7 +10,7 @@ Leaves: a certified one that is more even, or better.
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND
+from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND, have_same_values
 from pyomo_fesd.mpcc.algorithm.branches import PROGRESS, is_below
 from pyomo_fesd.mpcc.algorithm.neighbours import AT_BOUND
 
@@ -33,13 +33,14 @@ class Evenness:
 
     def __init__(self, subsolves, branches, even):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
-        self._subsolves, self._branches, self._even = subsolves, branches, even
+        self._subsolves, self._branches, self._even, self._known = subsolves, branches, even, []
 
     def improve(self):
         """From a certified incumbent with variables above their guide bounds, go to branches where they are lower."""
         point, tried = self.run.point, set()
-        if point is None or not point.certificate.certified or not self._is_uneven(point.w):
+        if point is None or not point.certificate.certified or not self._is_uneven(point.w) or self._is_known(point):
             return
+        self._known.append(point)
         evened = self._evened(point)
         if evened is not None:
             self.run.point = evened
@@ -49,6 +50,10 @@ class Evenness:
         while point is not None:
             self.run.point = point
             point = self._neighbour(point, tried, most)
+
+    def _is_known(self, point):
+        """Whether more even points than this one were sought before: an order of theirs may lead back to it."""
+        return any(have_same_values(point, before, self._subsolves.parts.motion) for before in self._known)
 
     def _is_uneven(self, w):
         c = self._c

@@ -74,6 +74,16 @@ class Parts:
         return found
 
     @cached_property
+    def motion(self):
+        """The extents of all parts and the values with which they end; all variables without parts.
+
+        Two solutions with the same ones are one: within a part some values are not determined.
+        """
+        if not self.all:
+            return np.arange(len(self._c.x0))
+        return np.unique([k for part in self.all for k in (part.extent, *part.last)])
+
+    @cached_property
     def is_gate(self):
         """Whether a variable (n) only says how its part begins."""
         found = np.zeros(len(self._c.x0), dtype=bool)

@@ -200,7 +200,7 @@ def test_where_the_place_is_left_out_another_point_is_gone_on_from_if_it_is_bett
 def test_another_motion_of_the_same_cost_settles_nothing(monkeypatch):
     p, coincidences, order, found = vanished(0.1, Stationarity.B, monkeypatch)
     w = p.run.point.w.copy()
-    w[coincidences._of_motion()[0]] += 1e-3
+    w[coincidences._subsolves.parts.motion[0]] += 1e-3
     other = replace(p.run.point, nlp=replace(p.run.point.nlp, w=w))
     monkeypatch.setattr(p.branches, 'without_short', lambda found: other)
     assert coincidences._order(p.run.point, order, []) is found

@@ -215,6 +215,26 @@ def test_a_path_whose_first_relaxation_does_not_reach_its_solution_is_left_for_t
     assert asked[:2] == forms
 
 
+@pytest.mark.parametrize('below, of_path', [(True, []), (False, [1.0])])
+def test_after_a_path_that_was_left_the_other_form_goes_around_its_best_point_and_from_the_start_only_if_that_is_no_help(
+    below, of_path, monkeypatch
+):
+    p, rounds, _ = completions(lambda x: (0.3, True))
+    relax, asked = p.subsolves.relax, []
+
+    def stopped(form, w, eps, *args):
+        asked.append((form, eps))
+        result = relax(form, w, eps, *args)
+        return replace(result, status='User_Requested_Stop') if len(asked) == 1 else result
+
+    monkeypatch.setattr(p.subsolves, 'relax', stopped)
+    monkeypatch.setattr(rounds, '_best_is_below', lambda before: below)
+    monkeypatch.setattr(rounds, '_is_far_below', lambda f: len(asked) == 1)
+    rounds.follow(p.compiled.x0)
+    assert asked[:3] == [('scholtes', 1.0), *(('elastic', pytest.approx(eps)) for eps in AROUND)]
+    assert [eps for _, eps in asked[3:4]] == of_path
+
+
 def test_another_path_goes_around_its_own_points(monkeypatch):
     # the first path has the better point, the branch of the second one is worse: relaxations begin there nevertheless
     p, rounds, _ = completions(lambda x: (0.3 if rounds._form == 'scholtes' else 0.0, True))

@@ -55,6 +55,14 @@ def test_parts_of_one_chain_follow_one_another():
     assert [parts.beside(k) for k in range(3)] == [(1,), (0,), ()]
 
 
+def test_the_motion_of_parts_is_their_extents_and_last_values():
+    assert of_hand().motion.tolist() == [1, 4, 5, 8, 9, 12]
+
+
+def test_without_parts_all_variables_are_the_motion():
+    assert Parts(SimpleNamespace(parts=[], x0=np.zeros(3))).motion.tolist() == [0, 1, 2]
+
+
 # What a part hands on: its inner variable, which rows of the next part contain
 
 ONE_CHAIN = (0, 0), (0, 1), (0, 2)
