@@ -42,8 +42,10 @@ class Coincidences:
 
     def __init__(self, subsolves, branches):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
-        self._subsolves, self._branches, self._settled = subsolves, branches, None
+        self._subsolves, self._branches = subsolves, branches
         self._orders, self._short, self._tried = Orders(subsolves), ShortPlaces(branches), {}
+        # all points whose orders are settled, and the last of them
+        self._known, self._settled = [], None
         # the point with places of least extent that was left last for a solution without them
         self._replacements, self._left = REPLACED, None
         # whether branches of orders are first solved with places of no extent, as this has led on where places as they are did not
@@ -57,7 +59,7 @@ class Coincidences:
                 if not self._leads_on(before):
                     return
                 continue
-            if self._takes_even(before):
+            if self._is_known(before) or self._takes_even(before):
                 continue
             # until all orders are settled any certified point is better
             self.run.point = replace(before, certificate=replace(before.certificate, grade=Stationarity.OPEN))
@@ -67,11 +69,20 @@ class Coincidences:
                 continue
             if found is SETTLED:
                 self.run.point = self._settled = before
+                self._known.append(before)
             elif found is not OPEN:
                 self._left = None
                 self._go_on(found)
             if found in (SETTLED, OPEN):
                 return
+
+    def _is_known(self, point):
+        """Whether a point is one whose orders were settled before, to which a more even one has led back; that is the incumbent then."""
+        motion = self._subsolves.parts.motion
+        known = next((one for one in self._known if have_same_values(one, point, motion)), None)
+        if known is not None:
+            self.run.point = self._settled = known
+        return known is not None
 
     def _go_on(self, found):
         """Descend from a better point in another order."""

@@ -88,6 +88,19 @@ def test_orders_that_stayed_open_are_not_tried_again(monkeypatch):
     assert len(tried) == 1
 
 
+@pytest.mark.parametrize('change, number', [(0.0, 1), (1e-3, 2)])
+def test_a_point_to_which_a_more_even_one_leads_back_is_the_one_that_was_settled(change, number, monkeypatch):
+    p, coincidences, order = a_branch(lambda point: None, monkeypatch)
+    before, tried = p.run.point, []
+    monkeypatch.setattr(coincidences, '_outcome', lambda point: tried.append(point) or SETTLED)
+    coincidences.settle()
+    w = before.w.copy()
+    w[coincidences._subsolves.parts.motion[0]] += change
+    p.run.point = again = replace(before, nlp=replace(before.nlp, w=w))
+    coincidences.settle()
+    assert len(tried) == number and p.run.point is (again if change else before)
+
+
 def test_a_point_is_replaced_by_others_with_fewer_places_of_least_extent_a_few_times_only(monkeypatch):
     p, coincidences, order = a_branch(lambda point: None, monkeypatch)
     others = []
