@@ -77,7 +77,7 @@ class Coincidences:
                 return
 
     def _is_known(self, point):
-        """Whether a point is one whose orders were settled before, to which a more even one has led back; that is the incumbent then."""
+        """Whether a more even point has led back to one whose orders were settled before, which is the incumbent then."""
         motion = self._subsolves.parts.motion
         known = next((one for one in self._known if have_same_values(one, point, motion)), None)
         if known is not None:
