@@ -8,7 +8,8 @@ from problems import carried
 from problems.parts import parts
 
 from pyomo_fesd.mpcc.algorithm.arrivals import Entered
-from pyomo_fesd.mpcc.algorithm.coincidences import OPEN, REPLACED, SETTLED, Coincidences
+from pyomo_fesd.mpcc.algorithm.coincidences import REPLACED, Coincidences
+from pyomo_fesd.mpcc.algorithm.order_branches import OPEN, SETTLED, OrderBranches
 from pyomo_fesd.mpcc.algorithm.orders import Order
 from pyomo_fesd.mpcc.subproblems import Stationarity, Verdict
 
@@ -19,7 +20,7 @@ NONE = np.zeros(0, dtype=int)
 def test_another_solution_with_a_spare_place_is_gone_on_from_if_it_is_better(gain, better, monkeypatch):
     p = parts(carried.simulated_with_jump(6))
     p.branches.explore_from(p.compiled.x0, False)
-    point, coincidences, bounds = p.run.point, Coincidences(p.subsolves, p.branches), p.compiled.lbx.copy()
+    point, ways, bounds = p.run.point, OrderBranches(p.subsolves, p.branches), p.compiled.lbx.copy()
     extent = p.compiled.neighbours[0].short
     way = Entered(extent, p.subsolves.sets(point.w, 1e-8).zero, point.w, NONE)
     found = replace(point, f=point.f - gain)
@@ -30,10 +31,10 @@ def test_another_solution_with_a_spare_place_is_gone_on_from_if_it_is_better(gai
         seen.append(np.array_equal(p.compiled.lbx, bounds))
         return found
 
-    monkeypatch.setattr(coincidences, '_beside', lambda point, way: (point.nlp, None))
-    monkeypatch.setattr(coincidences, '_is_another', lambda point, other: True)
+    monkeypatch.setattr(ways, '_beside', lambda point, way: (point.nlp, None))
+    monkeypatch.setattr(ways, '_is_another', lambda point, other: True)
     monkeypatch.setattr(p.branches.solutions, 'certified', certified)
-    assert coincidences._try(point, True, way) is (found if better else OPEN) and seen == [True]
+    assert ways._try(point, True, way) is (found if better else OPEN) and seen == [True]
 
 
 def a_branch(found, monkeypatch):
@@ -43,7 +44,7 @@ def a_branch(found, monkeypatch):
     way = Entered(p.compiled.neighbours[0].short, p.subsolves.sets(p.run.point.w, 1e-8).zero, p.run.point.w, NONE)
     coincidences = Coincidences(p.subsolves, p.branches)
     monkeypatch.setattr(p.branches.solutions, 'certified', lambda w, zero, **options: found(p.run.point))
-    monkeypatch.setattr(coincidences, '_try', lambda point, inserts, way: OPEN)
+    monkeypatch.setattr(coincidences._ways, '_try', lambda point, inserts, way: OPEN)
     return p, coincidences, Order([way], [lambda: Verdict.UNKNOWN])
 
 
@@ -128,8 +129,8 @@ def test_the_search_that_has_led_on_last_comes_first(monkeypatch):
         asked.append('none')
         return better if leads_on == 'none' else OPEN
 
-    monkeypatch.setattr(coincidences, '_grown', grown)
-    monkeypatch.setattr(coincidences, '_try', from_none)
+    monkeypatch.setattr(coincidences._ways, 'grown', grown)
+    monkeypatch.setattr(coincidences._ways, '_try', from_none)
     for leads_on, expected in (
         ('none', ['present', 'none']),
         ('none', ['none']),
@@ -206,7 +207,7 @@ def test_where_the_place_is_left_out_another_point_is_gone_on_from_if_it_is_bett
     w = p.run.point.w.copy()
     other = replace(p.run.point, f=p.run.point.f - gain, nlp=replace(p.run.point.nlp, w=w))
     monkeypatch.setattr(p.branches, 'without_short', lambda found: other)
-    monkeypatch.setattr(coincidences, '_is_another', lambda point, nlp: nlp is other.nlp)
+    monkeypatch.setattr(coincidences._ways, '_is_another', lambda point, nlp: nlp is other.nlp)
     assert coincidences._order(p.run.point, order, []) is (other if gain > 0 else found)
 
 
