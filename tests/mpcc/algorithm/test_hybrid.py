@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pyomo.environ as pyo
@@ -245,3 +246,14 @@ def test_a_certificate_that_was_stopped_early_is_made_at_last(monkeypatch):
     solver.run.point = replace(point, certificate=replace(point.certificate, grade=Stationarity.UNSOLVED))
     assert solver._certify_at_last() and solver.run.point.certificate.certified
     assert not solver._certify_at_last()
+
+
+@pytest.mark.parametrize('completions, expected', [(None, ['even', 'orders']), ('some', ['orders', 'even', 'orders'])])
+def test_orders_come_before_even_places_where_points_are_completed(completions, expected):
+    asked = []
+    solver = HybridSolver.__new__(HybridSolver)
+    solver.run, solver._completions = SimpleNamespace(point='point'), completions
+    solver._evenness = SimpleNamespace(improve=lambda: asked.append('even'))
+    solver._coincidences = SimpleNamespace(settle=lambda: asked.append('orders'))
+    solver._settle()
+    assert asked == expected
