@@ -264,6 +264,11 @@ def have_same_values(one, other, columns=slice(None)) -> bool:
     return bool((np.abs(a - b) <= SAME_VALUE * np.maximum(1.0, np.abs(a))).all())
 
 
+def one_of(known, point, columns):
+    """Return the one of ``known`` solutions that ``point`` is again, by the values in some columns; None if it is new."""
+    return next((one for one in known if have_same_values(one, point, columns)), None)
+
+
 def _is_clearly_above(f, below):
     return f > below + AS_GOOD * max(1.0, abs(below))
 

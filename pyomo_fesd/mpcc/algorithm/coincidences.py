@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import have_same_values
+from pyomo_fesd.mpcc.algorithm.branch_solutions import one_of
 from pyomo_fesd.mpcc.algorithm.order_branches import ABSENT, OPEN, SETTLED, OrderBranches
 from pyomo_fesd.mpcc.algorithm.orders import NEAR_BOUND, Orders, has_more_at_end, rows
 from pyomo_fesd.mpcc.algorithm.short_places import ShortPlaces
@@ -37,9 +37,8 @@ class Coincidences:
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._branches = subsolves, branches
         self._orders, self._ways, self._short = Orders(subsolves), OrderBranches(subsolves, branches), ShortPlaces(branches)
-        self._tried = {}
-        # all points whose orders are settled, and the last of them
-        self._known, self._settled = [], None
+        # all points whose orders are settled, and the last of them; those whose orders stayed open
+        self._known, self._settled, self._open = [], None, set()
         # the point with places of least extent that was left last for a solution without them
         self._replacements, self._left = REPLACED, None
 
@@ -70,8 +69,7 @@ class Coincidences:
 
     def _is_known(self, point):
         """Whether a more even point has led back to one whose orders were settled before, which is the incumbent then."""
-        motion = self._subsolves.parts.motion
-        known = next((one for one in self._known if have_same_values(one, point, motion)), None)
+        known = one_of(self._known, point, self._subsolves.parts.motion)
         if known is not None:
             self.run.point = self._settled = known
         return known is not None
@@ -150,14 +148,12 @@ class Coincidences:
         return replace(certificate, grade=Stationarity.OPEN if found is OPEN else Stationarity.DESCENT)
 
     def _outcome_once(self, point):
-        """The outcome of a point; that of before where it led nowhere: several branches and starts have the same solution."""
+        """The outcome of a point; orders that stayed open are not tried again, as several branches have the same solution."""
         key = point.f, point.w.tobytes()
-        if key not in self._tried:
-            found = self._outcome(point)
-            if not isinstance(found, str):
-                return found
-            self._tried[key] = found
-        return self._tried[key]
+        found = OPEN if key in self._open else self._outcome(point)
+        if found is OPEN:
+            self._open.add(key)
+        return found
 
     def _outcome(self, point, goes_on=True):
         """A better point; or whether all orders are settled.

@@ -80,7 +80,7 @@ class Completions:
         """Run all rounds from ``start``; the best point, certified if it can be, is in the run."""
         for form, looser in self._paths:
             is_last = (form, looser) == self._paths[-1]
-            leads_away = not self._leads_on(form) and self._follow(form, start, self._options.eps_init * looser, is_last)
+            leads_away = False if self._goes_around(form) else self._follow(form, start, self._options.eps_init * looser, is_last)
             if not (self._possible or leads_away) or not self._promising() or self._deadline.expired():
                 break
         if self._left is not None and self._possible and self._is_far_below(self._last):
@@ -109,10 +109,10 @@ class Completions:
         self._follow(form, start, self._options.eps_init * looser, True)
         return True
 
-    def _leads_on(self, form):
-        """Whether relaxations of another form lead on from the best point of a path that was left.
+    def _goes_around(self, form):
+        """Rounds of another form around the best point of a path that was left; returns whether they lead on.
 
-        From the start they would reach their solutions no better than those of this path.
+        From the start such relaxations may not reach their solutions either (those of discs do not).
         """
         before = self._best
         if self._left is None or before is None:

@@ -10,7 +10,7 @@ Leaves: a certified one that is more even, or better.
 
 import numpy as np
 
-from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND, have_same_values
+from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND, one_of
 from pyomo_fesd.mpcc.algorithm.branches import PROGRESS, is_below
 from pyomo_fesd.mpcc.algorithm.neighbours import AT_BOUND
 
@@ -53,7 +53,7 @@ class Evenness:
 
     def _is_known(self, point):
         """Whether more even points than this one were sought before: an order of theirs may lead back to it."""
-        return any(have_same_values(point, before, self._subsolves.parts.motion) for before in self._known)
+        return one_of(self._known, point, self._subsolves.parts.motion) is not None
 
     def _is_uneven(self, w):
         c = self._c

@@ -198,7 +198,7 @@ class HybridSolver:
     def _settle(self):
         """Go to more even solutions and try all orders of changes, until neither leads on."""
         if self._completions is not None:
-            # from their ends orders mostly lead on: what is more even than these would not matter
+            # an order may lead on from their end, and what is more even than that would not matter
             self._coincidences.settle()
         for _ in range(ROUNDS):
             self._evenness.improve()

@@ -77,7 +77,7 @@ class Parts:
     def motion(self):
         """The extents of all parts and the values with which they end; all variables without parts.
 
-        Two solutions with the same ones are one: within a part some values are not determined.
+        Within a part some values are not determined, so that two solutions that agree in these alone may count as one.
         """
         if not self.all:
             return np.arange(len(self._c.x0))

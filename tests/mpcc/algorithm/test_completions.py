@@ -42,6 +42,19 @@ def completions(complete, deadline=None, **options):
     return p, Completions(setup, p.subsolves, p.branches), asked
 
 
+def one_stopped(p, monkeypatch, number=1):
+    """Let the relaxation with this number end at its limit; returns the list of form, eps and limit of all, which grows."""
+    relax, asked = p.subsolves.relax, []
+
+    def stopped(form, w, eps, duals, most):
+        asked.append((form, eps, most))
+        result = relax(form, w, eps, duals, most)
+        return replace(result, status='User_Requested_Stop') if len(asked) == number else result
+
+    monkeypatch.setattr(p.subsolves, 'relax', stopped)
+    return asked
+
+
 def test_the_branch_of_the_completion_is_solved_and_certified():
     p, rounds, _ = completions(lambda x: (max(x, 0.1), True))
     rounds.follow(p.compiled.x0)
@@ -133,19 +146,12 @@ def test_a_relaxation_leads_on_itself_where_the_rounds_of_a_cycle_only_promise_m
 
 def test_a_path_that_was_left_goes_on_where_the_other_one_does_not_keep_what_relaxations_promise(monkeypatch):
     p, rounds, _ = completions(lambda x: (0.3, True))
-    relax, asked = p.subsolves.relax, []
-
-    def stopped(form, w, eps, *args):
-        asked.append((form, eps))
-        result = relax(form, w, eps, *args)
-        return replace(result, status='User_Requested_Stop') if len(asked) == 1 else result
-
-    monkeypatch.setattr(p.subsolves, 'relax', stopped)
+    asked = one_stopped(p, monkeypatch)
     monkeypatch.setattr(rounds, '_is_far_below', lambda f: True)
     rounds.follow(p.compiled.x0)
-    forms = [form for form, _ in asked]
+    forms = [form for form, *_ in asked]
     assert forms[:2] == ['scholtes', 'elastic']
-    assert next(eps for form, eps in asked[2:] if form == 'scholtes') == pytest.approx(1e-1)
+    assert next(eps for form, eps, _ in asked[2:] if form == 'scholtes') == pytest.approx(1e-1)
 
 
 @pytest.mark.parametrize('far_below, follows', [(True, True), (False, False)])
@@ -170,19 +176,12 @@ def test_no_relaxation_follows_an_infeasible_one(monkeypatch):
 @pytest.mark.parametrize('number, budgets', [(1, [200, 200, 200, 200]), (2, [200, 500, 200, 200]), (9, [200, 500, 500, 500])])
 def test_the_first_relaxation_has_fewer_iterations_and_all_have_after_one_that_was_stopped(number, budgets, monkeypatch):
     p, rounds, _ = to_other_branches()
-    relax, given = p.subsolves.relax, []
-
-    def stopped_once(form, w, eps, duals, most):
-        given.append(most)
-        result = relax(form, w, eps, duals, most)
-        return replace(result, status='User_Requested_Stop') if len(given) == number else result
-
-    monkeypatch.setattr(p.subsolves, 'relax', stopped_once)
+    asked = one_stopped(p, monkeypatch, number)
     rounds._follow('scholtes', p.compiled.x0, 1.0, True)
-    assert given[:4] == budgets
-    given = []
+    assert [most for *_, most in asked[:4]] == budgets
+    asked.clear()
     rounds._follow('elastic', p.compiled.x0, 1.0, True)
-    assert set(given) == {budgets[-1]}, "on another path, too"
+    assert {most for *_, most in asked} == {budgets[-1]}, "on another path, too"
 
 
 def test_a_path_that_ends_infeasible_is_followed_by_one_of_the_other_form(monkeypatch):
@@ -203,16 +202,9 @@ def test_a_path_that_ends_infeasible_is_followed_by_one_of_the_other_form(monkey
 @pytest.mark.parametrize('number, forms', [(1, ['scholtes', 'elastic']), (2, ['scholtes', 'scholtes'])])
 def test_a_path_whose_first_relaxation_does_not_reach_its_solution_is_left_for_the_other_form(number, forms, monkeypatch):
     p, rounds, _ = completions(lambda x: (0.3, True))
-    relax, asked = p.subsolves.relax, []
-
-    def stopped(form, *args):
-        asked.append(form)
-        result = relax(form, *args)
-        return replace(result, status='User_Requested_Stop') if len(asked) == number else result
-
-    monkeypatch.setattr(p.subsolves, 'relax', stopped)
+    asked = one_stopped(p, monkeypatch, number)
     rounds.follow(p.compiled.x0)
-    assert asked[:2] == forms
+    assert [form for form, *_ in asked[:2]] == forms
 
 
 @pytest.mark.parametrize('below, of_path', [(True, []), (False, [1.0])])
@@ -220,19 +212,12 @@ def test_after_a_path_that_was_left_the_other_form_goes_around_its_best_point_an
     below, of_path, monkeypatch
 ):
     p, rounds, _ = completions(lambda x: (0.3, True))
-    relax, asked = p.subsolves.relax, []
-
-    def stopped(form, w, eps, *args):
-        asked.append((form, eps))
-        result = relax(form, w, eps, *args)
-        return replace(result, status='User_Requested_Stop') if len(asked) == 1 else result
-
-    monkeypatch.setattr(p.subsolves, 'relax', stopped)
+    asked = one_stopped(p, monkeypatch)
     monkeypatch.setattr(rounds, '_best_is_below', lambda before: below)
     monkeypatch.setattr(rounds, '_is_far_below', lambda f: len(asked) == 1)
     rounds.follow(p.compiled.x0)
-    assert asked[:3] == [('scholtes', 1.0), *(('elastic', pytest.approx(eps)) for eps in AROUND)]
-    assert [eps for _, eps in asked[3:4]] == of_path
+    assert [form for form, *_ in asked[:3]] == ['scholtes', 'elastic', 'elastic']
+    assert [eps for _, eps, _ in asked[:4]] == pytest.approx([1.0, *AROUND, *of_path])
 
 
 def test_another_path_goes_around_its_own_points(monkeypatch):
