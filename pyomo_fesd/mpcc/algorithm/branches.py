@@ -4,6 +4,7 @@ The best point so far is ``Run.point``: an exactly complementary solution of its
 """
 
 from collections import Counter, deque
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -25,6 +26,8 @@ TRIES = 2
 #: The trust region of a descent step shrinks by this factor, so many times; once where a branch was followed onward from the point
 #: before (of ten such searches of discs, 3 to 5 s each, none has led down).
 SHRINK, SHRINKS = 0.1, {False: 3, True: 1}
+#: It grows by this from the one that has led down before.
+GROWTH = 3.0
 #: Ipopt leaves sides without a multiplier at the root of its tolerance.  Those below this count as zero as well, if this descends
 #: clearly: gradients are inexact too.
 NEARLY, CLEAR = 1e-4, 1e-4
@@ -189,11 +192,28 @@ class Branches:
         return self.run.point.f < before.f - part * max(1.0, abs(before.f))
 
     def _widen_from(self, end):
-        """Go on without guide bounds from a point below the incumbent that only these keep from descending."""
+        """Go on from a point below the incumbent that only bounds of the method keep from descending.
+
+        First without guide bounds; then, with decisions of sides, in branches without its variables at their lower bound.
+        """
         if end is None or end.certificate.grade is not Stationarity.LIMITED:
             return
-        if is_below(end, self.run.point.f - PROGRESS * max(1.0, abs(self.run.point.f))) and self._c.widen():
+        incumbent = self.run.point
+        enough = incumbent.f - PROGRESS * max(1.0, abs(incumbent.f))
+        if not is_below(end, enough):
+            return
+        if self._c.widen():
             self._release(end)
+        elif self.solutions.at_once:
+            self._pass_bounds(end, enough)
+
+    def _pass_bounds(self, end, enough):
+        """Go on in the branches without the variables of ``end`` at their lower bound until the incumbent is better."""
+        incumbent = self.run.point
+        for zero in self.neighbours.beside_short(end):
+            self.improve_from(self.solutions.certified(end.w, zero, max_iter=SECOND, below=incumbent.f, enough=enough), True)
+            if self._is_progress(incumbent, PROGRESS):
+                return
 
     def release(self):
         """Go on from the incumbent, which guide bounds kept from descending, after these have been widened."""
@@ -201,7 +221,8 @@ class Branches:
 
     def _release(self, point):
         zero = self._subsolves.sets(point.w, self._tolerances.biactive).zero
-        self.improve_from(self.solutions.certified(point.w, zero, max_iter=SECOND), True)
+        released = self.solutions.certified(point.w, zero, max_iter=SECOND)
+        self.improve_from(self._without_narrow(zero, True) if released is None else released, True)
 
     def search(self, *starts):
         """Search for any feasible branch: by the LPEC with every pair as a binary, then depth first over the pairs."""
@@ -300,20 +321,29 @@ class Branches:
     def _step_down(self, point, enough):
         """In the branch of the direction: from its end, or onward from the point, or within ever smaller trust regions."""
         step = point.certificate.lpec
+        if point.reach is not None and self.solutions.at_once:
+            better = self._within_reach(point, enough, (GROWTH * point.reach, point.reach))
+            if better is not None:
+                return better
         better = self._point(point.w + step.d, step.zero, None, False)
         if is_below(better, enough) or _settles(better, point):
             return better
         # from the end of a direction Ipopt may go back; from the point itself it follows it, if slowly
         follows = self._patient and point.equal is not None
         onward = self.solutions.onward(point, step.zero, enough) if follows else None
-        return self._within_reach(point, enough, SHRINKS[follows]) if onward is None else onward
+        radii = (self._tolerances.radius * SHRINK**k for k in range(1, 1 + SHRINKS[follows]))
+        return self._within_reach(point, enough, radii) if onward is None else onward
 
-    def _within_reach(self, point, enough, times):
-        """In the branch of the best direction within a trust region, which shrinks until one leads down."""
-        w, radius = point.w, self._tolerances.radius
+    def _within_reach(self, point, enough, radii):
+        """In the branch of the best direction within a trust region, of which the radii are tried until one leads down.
+
+        With decisions of sides small steps are not worth it where the incumbent is certified.
+        """
+        w, incumbent = point.w, self.run.point
+        if self.solutions.at_once and incumbent is not None and incumbent.certificate.certified:
+            enough = min(enough, point.f - UNEVEN * max(1.0, abs(point.f)))
         sets = self._subsolves.sets(w, self._tolerances.biactive)
-        for _ in range(times):
-            radius *= SHRINK
+        for radius in radii:
             step = self._subsolves.lpec(w, sets, radius, point.equal, limits=self._subsolves.patience())
             if not step.solved or step.descent == 0.0:
                 return None
@@ -321,7 +351,7 @@ class Branches:
             within = {'box': (w - reach, w + reach), 'max_iter': self._first}
             better = self.solutions.certified(w + step.d, step.zero, below=point.f, **within)
             if is_below(better, enough) or _settles(better, point):
-                return better
+                return replace(better, reach=radius)
         return None
 
     def _beyond(self, point, enough, tolerance, clear, limits=None):
@@ -338,6 +368,18 @@ class Branches:
         return self._point(point.w + step.d, step.zero, None, False, enough=enough)
 
     def _point(self, w, zero, duals, final, **more):
+        """The solution of branch ``zero``, or of one without the places of least extent that keep it from having one; or None."""
+        point = self._solution(w, zero, duals, final, **more)
+        return self._without_narrow(zero, final, **more) if point is None else point
+
+    def _without_narrow(self, zero, final, **more):
+        """A solution without places of least extent that kept the branch ``zero`` from having one; None without any."""
+        end = self.solutions.narrow(zero)
+        others = [] if end is None else self.neighbours.with_fewer_short(Point(end, np.inf, None))
+        found = (self._solution(end.w, other, None, final, **more) for other in others)
+        return next((point for point in found if point is not None), None)
+
+    def _solution(self, w, zero, duals, final, **more):
         """The solution of branch ``zero``, certified; None if it has none.
 
         A branch that was solved is not solved again; one that failed is tried once more, without multipliers.

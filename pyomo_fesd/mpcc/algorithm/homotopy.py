@@ -91,8 +91,20 @@ class Homotopy:
             self.run.eps = self._position.eps
             relaxed = self._relax(self._position)
             self._subsolves.keep_least_infeasible(relaxed.w)
-            step = self._next if self._subsolves.usable(relaxed) else self._recover
+            step = self._next if self._is_on_the_path(relaxed) else self._recover
             self._position = step(self._position, relaxed)
+
+    def _is_on_the_path(self, relaxed):
+        """Whether a relaxation can be gone on from: usable, and beside impacts not stopped where its products are still above eps.
+
+        The rows of an elastic one hold whatever its slack is.
+        """
+        has_left = self._c.impacts and relaxed.stopped and self._largest_product(relaxed.w) > self._position.eps * ROUND_OFF
+        return self._subsolves.usable(relaxed) and not has_left
+
+    def _largest_product(self, w):
+        at = self._c.evaluate(w)
+        return float(np.max(at.G * at.H, initial=0.0))
 
     def _relax(self, position):
         form, duals = self._form(position), self._duals(position)
@@ -155,8 +167,7 @@ class Homotopy:
     def _next(self, position, relaxed):
         """Explore the branch that the relaxation names; the position after it, or None."""
         self.end, options = relaxed, self._options
-        at = self._c.evaluate(relaxed.w)
-        product = float(np.max(at.G * at.H, initial=0.0))
+        at, product = self._c.evaluate(relaxed.w), self._largest_product(relaxed.w)
         sets = self._subsolves.sets(relaxed.w, self._subsolves.biactive(at))
         self._gap.add(position.eps, at.f)
         self.finished = position.eps <= options.eps_final * ROUND_OFF
@@ -169,7 +180,7 @@ class Homotopy:
         self._after(self.run)
         if (explores or nearby) and self._settled(position.named, named):
             return None
-        if self.finished or (exhausted and explores and self._branches.tried(sets.zero)):
+        if self._promises_nothing() or self.finished or (exhausted and explores and self._branches.tried(sets.zero)):
             return self._other_path(position, relaxed)
         # no change before eps falls below the largest product
         eps = max(min(position.eps, product) * options.eps_factor, options.eps_final)
@@ -191,6 +202,10 @@ class Homotopy:
         if self._gap.closed(best):
             return True
         return None not in (before, now) and self._gap.same(max(before, now), best)
+
+    def _promises_nothing(self):
+        """Whether the incumbent is as good as the path still promises: beside impacts smaller eps only lead to worse points."""
+        return bool(self._c.impacts) and self.run.point is not None and self._gap.closed(self.run.point.f)
 
     def _other_path(self, position, relaxed):
         """After a path without a certified point: the same path with wider bounds if they were missing, else the next one."""

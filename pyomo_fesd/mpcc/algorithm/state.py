@@ -144,13 +144,15 @@ class Counts:
 class Point:
     """An exactly complementary point: the NlpResult of its branch with Certificate and the decisions in force.
 
-    ``f`` is its objective, and what that owes to rows that hold to the tolerances only.
+    ``f`` is its objective, and what that owes to rows that hold to the tolerances only.  ``reach`` is the radius of the trust
+    region within which it was found, None without one.
     """
 
     nlp: object
     f: float
     certificate: object
     equal: object = None
+    reach: Optional[float] = None
 
     @property
     def w(self) -> np.ndarray:

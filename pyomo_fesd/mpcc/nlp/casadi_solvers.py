@@ -134,13 +134,14 @@ class _CasadiNlp(NlpSolver):
         """The reason why casadi does not have it, or None."""
         return None if ca.has_nlpsol(name) else f"casadi {ca.__version__} was built without it"
 
-    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None):
         self._size, options = x.numel() + g.numel(), options or {}
         check_options(self.PLUGIN, options, self._refusal, self.GIVEN)
         self._watch = _StopCallback(x.numel(), g.numel(), p.numel(), deadline or Deadline())
         # casadi's warnings would go to the stderr of the whole process
         settings = {'print_time': False, 'show_eval_warnings': False, 'iteration_callback': self._watch}
-        self._own, self._options, self._made = settings, (budget, options), {}
+        self._own, self._options, self._made = settings, options, {}
+        self._budgets = {False: budget, True: budget | (warm or {})}
         self._name, self._problem, self._derivatives = name, {'x': x, 'p': p, 'f': f, 'g': g}, derivatives
 
     @abstractmethod
@@ -174,7 +175,7 @@ class _CasadiNlp(NlpSolver):
     def _solver_for(self, warm):
         """The solver for a start without or with multipliers, made when it is first needed."""
         if warm not in self._made:
-            settings = self._given | {self.PLUGIN: self._settings(*self._options, warm)}
+            settings = self._given | {self.PLUGIN: self._settings(self._budgets[warm], self._options, warm)}
             self._made[warm] = ca.nlpsol(self._name, self.PLUGIN, self._problem, settings)
         return self._made[warm]
 
@@ -235,11 +236,11 @@ class CasadiUno(_CasadiNlp):
         except (OSError, AttributeError) as error:
             return f"casadi {ca.__version__} has none with a C interface ({error})"
 
-    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None):
         x, p, f, g, derivatives = as_sx(x, p, f, g, derivatives)
         # with a violated row without variables Uno's QP solver may never return, whatever the limits
         self._varying, self._g = rows_with_variables(g, x), ca.Function('g', [x, p], [ca.densify(g)])
-        super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, derivatives, options)
+        super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, derivatives, options, warm)
 
     def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
         """Solve from ``w0``; see ``NlpSolver``."""

@@ -92,7 +92,7 @@ class _Callbacks:
 class CyIpopt(NlpSolver):
     """Ipopt of the system.  Our defaults that its version does not know are left out.  See ``NlpSolver``."""
 
-    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None):
         x, p, f, g, derivatives = as_sx(x, p, f, g, derivatives)
         d = derivatives or automatic(x, f, g)
         # Ipopt expects the lower triangle
@@ -109,6 +109,7 @@ class CyIpopt(NlpSolver):
         options = options or {}
         check_options('cyipopt', options, _refusal)
         self._options = _accepted(tuple((IPOPT | budget).items())) | options
+        self._warm = _accepted(tuple(((warm or {}) | IPOPT_WARM).items())) | options
 
     def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
         """Solve from ``w0``; see ``NlpSolver``.  Older Ipopts do not show multipliers on their way."""
@@ -117,7 +118,7 @@ class CyIpopt(NlpSolver):
         problem = cyipopt.Problem(n=len(lbx), m=len(lbg), problem_obj=callbacks, lb=lbx, ub=ubx, cl=lbg, cu=ubg)
         settings, start = dict(self._options), {}
         if duals is not None:
-            settings |= _accepted(tuple(IPOPT_WARM.items()))
+            settings |= self._warm
             start = {'lagrange': duals.lam_g, 'zl': np.maximum(-duals.lam_x, 0.0), 'zu': np.maximum(duals.lam_x, 0.0)}
         if max_iter is not None:
             settings['max_iter'] = max_iter

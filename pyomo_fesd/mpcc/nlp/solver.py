@@ -134,6 +134,8 @@ class NlpSolver(ABC):
         if they are cheaper than those that casadi finds
     options : dict, optional
         the user's, in the solver's own names; they override ours
+    warm : dict, optional
+        ``budget`` of a start with multipliers, besides the other one
 
     Raises
     ------
@@ -147,7 +149,7 @@ class NlpSolver(ABC):
         return None
 
     @abstractmethod
-    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None):
         pass
 
     @abstractmethod

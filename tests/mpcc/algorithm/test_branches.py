@@ -12,7 +12,7 @@ from pyomo.mpec import Complementarity, complements
 from pyomo_fesd.core import BranchConstraint, homotopy_hints
 from pyomo_fesd.mpcc.algorithm import branch_solutions, branches
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Stop
-from pyomo_fesd.mpcc.nlp import DIVERGING
+from pyomo_fesd.mpcc.nlp import DIVERGING, STALLED
 from pyomo_fesd.mpcc.subproblems.active_set import G_ZERO, H_ZERO, active_sets
 from pyomo_fesd.mpcc.subproblems.stationarity import Stationarity
 
@@ -399,6 +399,74 @@ def test_a_point_with_a_place_of_least_extent_has_to_be_better_by_the_error_of_t
     short = replace(with_a_short_place(p), f=1.0 - gain)
     p.branches._keep(short)
     assert (p.run.point is short) == kept and (p.run.point is best) != kept
+
+
+@pytest.mark.parametrize('violation, found', [(2 * branch_solutions.NARROW, False), (branch_solutions.NARROW / 2, True)])
+def test_a_branch_that_places_of_least_extent_make_infeasible_is_solved_without_them(monkeypatch, violation, found):
+    p = jump_inside_a_stage()
+    p.branches.solutions.at_once = True
+    end, attempt = with_a_short_place(p).nlp, p.subsolves.attempt
+    zero = p.subsolves.sets(end.w, 1e-8).zero
+
+    def contradicts(w, sides, *more, **options):
+        found = attempt(w, sides, *more, **options)
+        return replace(found, w=end.w, status=STALLED) if np.array_equal(sides, zero) else found
+
+    monkeypatch.setattr(p.subsolves, 'attempt', contradicts)
+    monkeypatch.setattr(p.subsolves, 'violation', lambda w: violation if np.array_equal(w, end.w) else 0.0)
+    p.branches.forget()
+    point = p.branches._point(end.w, zero, None, True)
+    assert (point is not None) == found
+    assert not found or (point.certificate.certified and p.branches.neighbours.number_of_short(point.w) == 0)
+
+
+def test_a_lower_point_that_places_of_least_extent_keep_from_descending_goes_on_without_them(monkeypatch):
+    p = jump_inside_a_stage()
+    p.branches.solutions.at_once = True
+    p.compiled.widen()
+    end = with_a_short_place(p)
+    limited = replace(end, f=0.9, certificate=replace(end.certificate, grade=Stationarity.LIMITED))
+    p.run.point = replace(p.run.point, f=1.0)
+    tried = [np.array([side]) for side in range(3)]
+    solutions = {0: None, 1: replace(p.run.point, f=0.95), 2: pytest.fail}
+    monkeypatch.setattr(p.branches.neighbours, 'beside_short', lambda point: iter(tried))
+    monkeypatch.setattr(p.branches.solutions, 'certified', lambda w, zero, **more: solutions[int(zero[0])])
+    monkeypatch.setattr(p.branches, 'descend', lambda *given: None)
+    p.branches._widen_from(limited)
+    assert p.run.point is solutions[1]
+    # a point that is not lower stays where it is
+    p.branches._widen_from(replace(limited, f=0.96))
+    assert p.run.point is solutions[1]
+
+
+@pytest.mark.parametrize('at_once', [True, False])
+def test_with_decisions_of_sides_a_trust_region_that_has_led_down_grows(monkeypatch, at_once):
+    p = at_point(trap(), False)
+    p.branches.solutions.at_once = at_once
+    point, radii = replace(p.run.point, reach=0.1), []
+    lpec, better = p.subsolves.lpec, replace(p.run.point, f=p.run.point.f - 0.5)
+
+    def watched(w, sets, radius, *more, **options):
+        radii.append(radius)
+        return lpec(w, sets, radius, *more, **options)
+
+    monkeypatch.setattr(p.subsolves, 'lpec', watched)
+    monkeypatch.setattr(p.branches.solutions, 'certified', lambda *given, **more: better if len(radii) > 1 else None)
+    found = p.branches.descend(point, True)
+    assert radii == pytest.approx([branches.GROWTH * 0.1, 0.1] if at_once else [0.1, 0.01]) and found.reach == radii[-1]
+
+
+@pytest.mark.parametrize('gain, known, follows', [(0.5, True, False), (2.0, True, True), (0.5, False, True)])
+def test_small_steps_are_not_worth_it_beside_a_certified_incumbent(monkeypatch, gain, known, follows):
+    p = at_point(trap(), False)
+    p.branches.solutions.at_once = True
+    point = p.run.point
+    better = replace(point, f=point.f - gain * branch_solutions.UNEVEN)
+    certified = replace(point.certificate, grade=Stationarity.B)
+    p.run.point = replace(point, certificate=certified) if known else point
+    monkeypatch.setattr(p.branches.solutions, 'certified', lambda *given, **more: better)
+    found = p.branches._within_reach(point, point.f - 1e-8, (0.1,))
+    assert (found is not None) == follows
 
 
 @pytest.mark.parametrize('at_once', [True, False])

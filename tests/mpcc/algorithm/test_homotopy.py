@@ -1,5 +1,6 @@
 """The path of relaxations: how eps falls, where it ends, and the mode that is nothing else."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from pyomo.contrib.solver.common.util import NoOptimalSolutionError
 from pyomo.mpec import Complementarity, complements
 
 from pyomo_fesd.core import homotopy_hints
+from pyomo_fesd.mpcc.algorithm.gap_test import GapTest
 from pyomo_fesd.mpcc.algorithm.homotopy import Homotopy
 from pyomo_fesd.mpcc.algorithm.recovery import RECOVERIES
 from pyomo_fesd.mpcc.nlp import NEWTON
@@ -148,6 +150,26 @@ def test_a_relaxation_that_its_budget_stops_goes_on_once_from_where_it_is():
     notes = [step.status for step in results.extra_info.steps if step.kind == 'recovery']
     assert all(after != 'go on' for before, after in zip(notes, notes[1:]) if before == 'go on')
     assert results.extra_info.stationarity == 'B'
+
+
+@pytest.mark.parametrize(
+    'impacts, stopped, product, goes_on',
+    [([1], True, 0.2, False), ([1], True, 0.1, True), ([1], False, 0.2, True), ([], True, 0.2, True)],
+)
+def test_beside_impacts_a_relaxation_that_is_stopped_with_products_above_eps_has_left_the_path(impacts, stopped, product, goes_on):
+    c = SimpleNamespace(impacts=impacts, evaluate=lambda w: SimpleNamespace(G=np.array([1.0]), H=np.array([product])))
+    homotopy = SimpleNamespace(_c=c, _position=SimpleNamespace(eps=0.1), _subsolves=SimpleNamespace(usable=lambda result: True))
+    homotopy._largest_product = partial(Homotopy._largest_product, homotopy)
+    assert Homotopy._is_on_the_path(homotopy, SimpleNamespace(stopped=stopped, w=np.zeros(2))) == goes_on
+
+
+@pytest.mark.parametrize('impacts, f, ends', [([1], 0.9, True), ([1], 1.1, False), ([], 0.9, False), ([1], None, False)])
+def test_beside_impacts_a_path_ends_where_its_incumbent_is_as_good_as_it_promises_also_without_a_certificate(impacts, f, ends):
+    gap = GapTest(1e-6, 1e-4)
+    gap.add(1e-3, 1.0)
+    point = None if f is None else SimpleNamespace(f=f)
+    homotopy = SimpleNamespace(_c=SimpleNamespace(impacts=impacts), _gap=gap, run=SimpleNamespace(point=point))
+    assert Homotopy._promises_nothing(homotopy) == ends
 
 
 def test_a_point_that_only_guide_bounds_hold_goes_on_without_them():

@@ -1,11 +1,11 @@
-"""What the single NLPs of a run are given: Ipopt's own scaling."""
+"""What the single NLPs of a run are given: Ipopt's own scaling, and its barrier parameter beside impacts."""
 
 import pyomo.environ as pyo
 import pytest
 from problems import contacts, free_start
 from pyomo import mpec
 
-from pyomo_fesd.mpcc.algorithm.subsolves import STEEP, STEEPEST_ROW
+from pyomo_fesd.mpcc.algorithm.subsolves import CENTRED, STEEP, STEEPEST_ROW
 from pyomo_fesd.mpcc.nlp.casadi_solvers import CasadiIpopt
 
 
@@ -17,6 +17,19 @@ def budgets(monkeypatch):
     def watched(self, name, x, p, f, g, budget, *args, **options):
         made.append((name, budget))
         init(self, name, x, p, f, g, budget, *args, **options)
+
+    monkeypatch.setattr(CasadiIpopt, '__init__', watched)
+    return made
+
+
+@pytest.fixture
+def warm(monkeypatch):
+    """The names of the NLP solvers that are made with a budget for a start with multipliers, and this budget."""
+    made, init = {}, CasadiIpopt.__init__
+
+    def watched(self, name, *args):
+        made.update({name: args[-1]} if args[-1] else {})
+        init(self, name, *args)
 
     monkeypatch.setattr(CasadiIpopt, '__init__', watched)
     return made
@@ -60,8 +73,20 @@ def test_a_problem_without_parts_has_ipopts_own_scaling(budgets):
     assert budgets and not any('nlp_scaling_max_gradient' in budget for _, budget in budgets)
 
 
-def test_beside_impacts_ipopt_scales_as_ever(budgets):
+def solve_ball(**options):
+    """Solve a ball that bounces, without a simulation before."""
     m = contacts.ball(0.5)
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=4, ncp=2)
-    pyo.SolverFactory('mpec_hybrid').solve(m, simulate_first=False)
+    pyo.SolverFactory('mpec_hybrid').solve(m, simulate_first=False, **options)
+
+
+def test_beside_impacts_ipopt_scales_as_ever(budgets):
+    solve_ball()
     assert budgets and not any('nlp_scaling_max_gradient' in budget for _, budget in budgets)
+
+
+def test_only_relaxations_beside_impacts_are_centred_where_they_start_with_multipliers(budgets, warm):
+    solve_steep(1.0)
+    assert budgets and not warm
+    solve_ball()
+    assert set(warm) == {name for name, _ in budgets} & {'elastic', 'scholtes'} and all(b == CENTRED for b in warm.values())

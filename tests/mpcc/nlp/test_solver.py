@@ -136,6 +136,17 @@ def test_budget_limits_iterations(solver):
     assert result.iterations == 2
 
 
+@pytest.mark.parametrize('name', ['ipopt', 'cyipopt'])
+def test_a_start_with_multipliers_may_have_a_budget_of_its_own_and_the_user_overrides_it(name):
+    pytest.importorskip('casadi' if name == 'ipopt' else name)
+    w0, p, lbx, ubx, lbg, ubg = np.full(2, 0.5), [2.0], np.zeros(2), np.full(2, 10.0), np.array([-INF, 0.1]), np.array([2, INF])
+    problem = distance(name, warm={'max_iter': 0})
+    cold = problem.solve(w0, p, lbx, ubx, lbg, ubg)
+    assert cold.solved and problem.solve(w0, p, lbx, ubx, lbg, ubg, duals=cold).iterations == 0
+    given = distance(name, warm={'max_iter': 0}, options={'max_iter': 100})
+    assert given.solve(w0, p, lbx, ubx, lbg, ubg, duals=cold).solved
+
+
 @pytest.mark.parametrize(('steepest', 'diverges'), [(0.0, True), (1e9, False), (INF, False)])
 def test_multipliers_that_stay_above_their_limit_end_the_solve(steepest, diverges):
     # Newton's method goes a sixteenth of the way to the root of x^16 in each iteration
