@@ -8,6 +8,7 @@ import pandas as pd
 import pyomo.environ as pyo
 import pytest
 from benchmarks.hard_ocp import ball, carts, cases, discs, hopper, summary
+from benchmarks.hard_ocp.events import CROSSED, first_crossing
 from benchmarks.hard_ocp.replay import Plant, replay
 from scipy.optimize import brentq
 
@@ -54,6 +55,13 @@ def test_a_short_visit_is_found_and_a_near_miss_is_not(above, impacts):
     ceiling = replace(point(lambda q: 1 - q[1:], (0.0, -1.0)), restitution=1.0)
     end = replay(ceiling, ((0.0, 0.0), (0.0, np.sqrt(20 * (1 + above)))), [[0.0]], [0.8])
     assert len(end.impacts) == impacts
+
+
+@pytest.mark.parametrize('start, slope, crosses', [(-1.1, 1.0, False), (-1.1, -1.0, True), (-3.0, 0.1, True), (0.0, -1.0, True)])
+def test_a_function_that_begins_below_by_round_off_has_to_fall_further(start, slope, crosses):
+    grid = np.linspace(0.0, 10 * CROSSED, 5)
+    found = first_crossing((lambda t: start * CROSSED + slope * t, {}), grid)
+    assert (found is not None) == crosses
 
 
 def test_a_block_slides_until_it_stops_and_sticks():

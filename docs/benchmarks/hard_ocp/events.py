@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import numpy as np
 from benchmarks.hard_ocp.laws import accelerations
 from scipy.optimize import brentq, minimize_scalar
 
@@ -52,12 +53,14 @@ def watched_functions(plant, u, modes, solution, n):
 def first_crossing(watched, grid):
     """The first time at which a function falls below -CROSSED, and the modes known then; None if it does not.
 
-    Between samples a function that falls and rises again is found at its minimum.
+    Between samples a function that falls and rises again is found at its minimum.  One that begins below, by the round-off of the
+    event before, has to fall further.
     """
     function, known = watched
+    least = float(np.clip(function(grid[0]), -2 * CROSSED, -CROSSED))
 
     def f(t):
-        return float(function(t)) + CROSSED
+        return float(function(t)) - least
 
     values = [f(t) for t in grid]
     for k, (left, right) in enumerate(pairwise(grid)):

@@ -26,8 +26,8 @@ TRIES = 2
 #: The trust region of a descent step shrinks by this factor, so many times; once where a branch was followed onward from the point
 #: before (of ten such searches of discs, 3 to 5 s each, none has led down).
 SHRINK, SHRINKS = 0.1, {False: 3, True: 1}
-#: It grows by this from the one that has led down before.
-GROWTH = 3.0
+#: It grows by the first number from one within which the objective has fallen by the second, relative.
+GROWTH, FALL = 3.0, 1e-3
 #: Ipopt leaves sides without a multiplier at the root of its tolerance.  Those below this count as zero as well, if this descends
 #: clearly: gradients are inexact too.
 NEARLY, CLEAR = 1e-4, 1e-4
@@ -351,7 +351,7 @@ class Branches:
             within = {'box': (w - reach, w + reach), 'max_iter': self._first}
             better = self.solutions.certified(w + step.d, step.zero, below=point.f, **within)
             if is_below(better, enough) or _settles(better, point):
-                return replace(better, reach=radius)
+                return replace(better, reach=radius if is_below(better, point.f - FALL * max(1.0, abs(point.f))) else None)
         return None
 
     def _beyond(self, point, enough, tolerance, clear, limits=None):
