@@ -22,8 +22,9 @@ LAST, AROUND = 1e-3, (1e-1, 1e-2)
 #: Part of ``relaxation_iterations`` that the first relaxation may use, and all others after one that has not reached its solution:
 #: then most do not, and the completion of a point on the way is as good.
 BUDGET = 0.4
-#: Times that relaxations go around the best point at most, and the part by which its objective must fall to go on.
-CYCLES, PROGRESS = 6, 1e-2
+#: Times that relaxations go around the best point at most, and the part by which its objective must fall to go on: more than the
+#: error of uneven elements.
+CYCLES, PROGRESS = 6, 2e-2
 #: option ``relaxation`` -> paths: the form of their relaxations, and their first eps relative to the option ``eps_init``.  Bounds
 #: of products may lead to a local minimum of the violation, and penalties to where nothing touches: each form finds what the other
 #: one misses.
