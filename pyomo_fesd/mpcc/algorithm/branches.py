@@ -3,36 +3,22 @@
 The best point so far is ``Run.point``: an exactly complementary solution of its branch NLP with the certificate of the LPEC.
 """
 
-from collections import Counter, deque
-from dataclasses import replace
+from collections import deque
 from itertools import chain
 
 import numpy as np
 
+from pyomo_fesd.mpcc.algorithm.attempts import Attempts
 from pyomo_fesd.mpcc.algorithm.branch_solutions import FIRST, SECOND, UNEVEN, BranchSolutions, as_good
+from pyomo_fesd.mpcc.algorithm.descents import PROGRESS, Descents, is_below
 from pyomo_fesd.mpcc.algorithm.neighbours import Neighbours
 from pyomo_fesd.mpcc.algorithm.search import FEW, Verdict, exhaust, leaves
 from pyomo_fesd.mpcc.algorithm.state import Point
-from pyomo_fesd.mpcc.subproblems import MATTERS, Stationarity
+from pyomo_fesd.mpcc.subproblems import Stationarity
 
-#: A branch NLP's objective must fall by this, relative, to count as descent.
-PROGRESS = 1e-8
-#: So much in a neighbouring branch, where a place of least extent gives a little less to each one that takes it over.
+#: The objective must fall by this, relative, in a neighbouring branch to count as descent: a place of least extent gives a little
+#: to each one that takes it over.
 WORTH = 1e-6
-#: So much from a point whose branch NLP did not end: smaller steps only go on in a branch that Ipopt cannot finish.
-UNFINISHED = 1e-3
-#: Attempts at a branch NLP before it counts as infeasible.
-TRIES = 2
-#: The trust region of a descent step shrinks by this factor, so many times; once where a branch was followed onward from the point
-#: before (of ten such searches of discs, 3 to 5 s each, none has led down).
-SHRINK, SHRINKS = 0.1, {False: 3, True: 1}
-#: It grows by the first number from one within which the objective has fallen by the second, relative.
-GROWTH, FALL = 3.0, 1e-3
-#: Ipopt leaves sides without a multiplier at the root of its tolerance.  Those below this count as zero as well, if this descends
-#: clearly: gradients are inexact too.
-NEARLY, CLEAR = 1e-4, 1e-4
-#: HiGHS for an LPEC with a binary for every pair, which proves nothing: small descents and a long search are not worth it.
-WIDE = {'mip_abs_gap': 1e-6, 'mip_max_nodes': 100}
 #: With more bi-active pairs than this an LPEC takes long and tells little about the branch.
 SUGGESTED = 50
 #: Trust region of the LPEC that searches for any feasible branch.
@@ -52,14 +38,21 @@ class Branches:
     patient : bool
         whether the first attempt at a branch, too, has the iterations of the second one: where points can be completed, branches
         are worth more than further relaxations
+
+    Attributes
+    ----------
+    solutions : BranchSolutions
+    neighbours : Neighbours
+    attempts : Attempts
+    descents : Descents
     """
 
     def __init__(self, subsolves, gap, global_lpec, patient=False):
         self._c, self._tolerances, self.run = subsolves.compiled, subsolves.tolerances, subsolves.run
         self._subsolves, self._gap, self._global_lpec = subsolves, gap, global_lpec
-        self._attempts, self._solved, self._exhausted = Counter(), {}, {}
-        self._patient = patient
-        self.solutions, self.neighbours = BranchSolutions(subsolves, at_once=patient), Neighbours(subsolves)
+        self.solutions, self.neighbours, self._exhausted = BranchSolutions(subsolves, at_once=patient), Neighbours(subsolves), {}
+        self.attempts = Attempts(self.solutions, self.neighbours, patient)
+        self.descents = Descents(subsolves, self.attempts, self.solutions, global_lpec)
 
     # called by the algorithm
 
@@ -80,22 +73,22 @@ class Branches:
         float or None
             the objective of the branch that the sets name, if it has a certified solution
         """
-        point = self._point(relaxed.w, sets.zero, relaxed, final)
+        point = self.attempts.point(relaxed.w, sets.zero, relaxed, final)
         if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
             step = self._subsolves.suggestion(relaxed.w, sets, self._tolerances.radius)
             if step.solved:
                 # undecided sides may be written in several ways
-                point = self._point(relaxed.w, self._subsolves.settled(relaxed.w, step.zero), relaxed, final)
+                point = self.attempts.point(relaxed.w, self._subsolves.settled(relaxed.w, step.zero), relaxed, final)
         # with the global LPEC search for better branches now: this point is not revisited
         self.improve_from(point, final or self._global_lpec)
-        return self._solved.get(sets.zero.tobytes())
+        return self.attempts.objective(sets.zero)
 
     def explore_nearby(self, relaxed, sets):
         """Solve the branch that active sets name where Newton's method does, and keep its solution if it is certified.
 
         This is no attempt at the branch: without a certified solution the path goes on as if nothing had been tried.
         """
-        if self.tried(sets.zero):
+        if self.attempts.tried(sets.zero):
             return
         point = self.solutions.certified(relaxed.w, sets.zero, duals=relaxed, nearby=True)
         if point is not None and point.certificate.certified:
@@ -103,7 +96,7 @@ class Branches:
 
     def explore_from(self, w, final):
         """Solve the branch that the values ``w`` name."""
-        self.improve_from(self._point(w, self._subsolves.sets(w, self._tolerances.biactive).zero, None, final), final)
+        self.improve_from(self.attempts.point(w, self._subsolves.sets(w, self._tolerances.biactive).zero, None, final), final)
 
     def explore_decided(self, w) -> bool:
         """Solve the branch that ``w`` names with the decisions that ``w`` asks for (eq. 13); return whether that settles it.
@@ -165,12 +158,12 @@ class Branches:
     def _try(self, point, *neighbours, wide=False):
         """Solve the branch of neighbours of a point, one after the other, unless it was tried, and go on from a better solution."""
         zero = self.neighbours.zero_sides(point, *neighbours, wide=wide)
-        if zero is None or self.tried(zero):
+        if zero is None or self.attempts.tried(zero):
             return
         start = point.w.copy()
         for neighbour in neighbours:
             start[neighbour.starts] = neighbour.at
-        self._widen_from(self.improve_from(self._point(start, zero, None, True, below=point.f), False))
+        self._widen_from(self.improve_from(self.attempts.point(start, zero, None, True, below=point.f), False))
 
     def without_short(self, point):
         """A certified solution without places of least extent beside a point that has some; None if there is none.
@@ -222,11 +215,11 @@ class Branches:
     def _release(self, point):
         zero = self._subsolves.sets(point.w, self._tolerances.biactive).zero
         released = self.solutions.certified(point.w, zero, max_iter=SECOND)
-        self.improve_from(self._without_narrow(zero, True) if released is None else released, True)
+        self.improve_from(self.attempts.without_narrow(zero, True) if released is None else released, True)
 
     def search(self, *starts):
         """Search for any feasible branch: by the LPEC with every pair as a binary, then depth first over the pairs."""
-        self.forget()
+        self.attempts.forget()
         # within the guide bounds, as degenerate branches beyond them would hide the contradiction
         self._c.narrow()
         for w in starts:
@@ -249,28 +242,10 @@ class Branches:
             self._exhausted[key] = exhaust(self._c, self._subsolves.node, w)
         return self._exhausted[key]
 
-    def tried(self, zero):
-        """Whether a branch has had its attempts."""
-        return self._attempts[zero.tobytes()] >= TRIES
-
-    def be_patient(self) -> bool:
-        """From now on give a first attempt the iterations of the second one; returns whether it had fewer."""
-        had_fewer, self._patient = not self._patient, True
-        return had_fewer
-
-    @property
-    def _first(self):
-        """The iterations of a first attempt."""
-        return SECOND if self._patient else FIRST
-
-    def forget(self):
-        """Reset the attempts: a branch that failed may succeed from another path."""
-        self._attempts.clear()
-
     # how a point is found
 
     def _found(self, w, zero):
-        self.improve_from(self._point(w, zero, None, True), True)
+        self.improve_from(self.attempts.point(w, zero, None, True), True)
         return self.run.point is not None
 
     def improve_from(self, point, final):
@@ -281,7 +256,7 @@ class Branches:
         end = None
         while point is not None:
             self._keep(point)
-            end, point = point, self.descend(point, final or self._gap.closed(point.f))
+            end, point = point, self.descents.better(point, final or self._gap.closed(point.f))
         return end
 
     def _keep(self, point):
@@ -296,114 +271,3 @@ class Branches:
         """Certified points come first, then those of lower objective; places of least extent are charged for their error."""
         error = UNEVEN * max(1.0, abs(point.f)) if self.solutions.at_once and self.neighbours.number_of_short(point.w) else 0.0
         return not point.certificate.certified, point.f + error
-
-    def descend(self, point, worth):
-        """A better point, or None; a point that is not ``worth`` a descent only gets the check of its certificate."""
-        size = max(1.0, abs(point.f))
-        enough = point.f - (PROGRESS if point.nlp.solved else UNFINISHED) * size
-        if point.certificate.grade is Stationarity.DESCENT:
-            return self._step_down(point, enough) if worth else None
-        if point.certificate.grade is not Stationarity.B:
-            return None
-        better = self._beyond(point, enough, NEARLY, CLEAR) or self._within_round_off(point)
-        return self._beyond(point, enough, np.inf, 0.0, WIDE) if better is None and worth and self._global_lpec else better
-
-    def _within_round_off(self, point):
-        """A clearly better point in the branch of a direction whose descent matters, though it proves nothing."""
-        step = point.certificate.lpec
-        if step is None or not step.matters:
-            return None
-        # with an objective of 0 any other point would be as good
-        enough = point.f - MATTERS * max(abs(point.f), -step.value)
-        found = (self.solutions.certified(w, step.zero, max_iter=SECOND, below=point.f) for w in (point.w + step.d, point.w))
-        return next((better for better in found if is_below(better, enough)), None)
-
-    def _step_down(self, point, enough):
-        """In the branch of the direction: from its end, or onward from the point, or within ever smaller trust regions."""
-        step = point.certificate.lpec
-        if point.reach is not None and self.solutions.at_once:
-            better = self._within_reach(point, enough, (GROWTH * point.reach, point.reach))
-            if better is not None:
-                return better
-        better = self._point(point.w + step.d, step.zero, None, False)
-        if is_below(better, enough) or _settles(better, point):
-            return better
-        # from the end of a direction Ipopt may go back; from the point itself it follows it, if slowly
-        follows = self._patient and point.equal is not None
-        onward = self.solutions.onward(point, step.zero, enough) if follows else None
-        radii = (self._tolerances.radius * SHRINK**k for k in range(1, 1 + SHRINKS[follows]))
-        return self._within_reach(point, enough, radii) if onward is None else onward
-
-    def _within_reach(self, point, enough, radii):
-        """In the branch of the best direction within a trust region, of which the radii are tried until one leads down.
-
-        With decisions of sides small steps are not worth it where the incumbent is certified.
-        """
-        w, incumbent = point.w, self.run.point
-        if self.solutions.at_once and incumbent is not None and incumbent.certificate.certified:
-            enough = min(enough, point.f - UNEVEN * max(1.0, abs(point.f)))
-        sets = self._subsolves.sets(w, self._tolerances.biactive)
-        for radius in radii:
-            step = self._subsolves.lpec(w, sets, radius, point.equal, limits=self._subsolves.patience())
-            if not step.solved or step.descent == 0.0:
-                return None
-            reach = radius * np.maximum(1.0, np.abs(w))
-            within = {'box': (w - reach, w + reach), 'max_iter': self._first}
-            better = self.solutions.certified(w + step.d, step.zero, below=point.f, **within)
-            if is_below(better, enough) or _settles(better, point):
-                return replace(better, reach=radius if is_below(better, point.f - FALL * max(1.0, abs(point.f))) else None)
-        return None
-
-    def _beyond(self, point, enough, tolerance, clear, limits=None):
-        """A better point in the branch that the LPEC names if all sides below ``tolerance`` count as zero."""
-        sets = self._subsolves.sets(point.w, tolerance)
-        if np.count_nonzero(sets.gamma) <= point.certificate.biactive:
-            return None
-        limits = self._subsolves.patience() | (limits or {})
-        # where the multipliers of the point show that no side descends, there is nothing to search for
-        shown = {'multipliers': -point.nlp.lam_g, 'enough': clear}
-        step = self._subsolves.lpec(point.w, sets, self._tolerances.radius, point.equal, limits=limits, **shown)
-        if not step.solved or step.descent <= clear:
-            return None
-        return self._point(point.w + step.d, step.zero, None, False, enough=enough)
-
-    def _point(self, w, zero, duals, final, **more):
-        """The solution of branch ``zero``, or of one without the places of least extent that keep it from having one; or None."""
-        point = self._solution(w, zero, duals, final, **more)
-        return self._without_narrow(zero, final, **more) if point is None else point
-
-    def _without_narrow(self, zero, final, **more):
-        """A solution without places of least extent that kept the branch ``zero`` from having one; None without any."""
-        end = self.solutions.narrow(zero)
-        others = [] if end is None else self.neighbours.with_fewer_short(Point(end, np.inf, None))
-        found = (self._solution(end.w, other, None, final, **more) for other in others)
-        return next((point for point in found if point is not None), None)
-
-    def _solution(self, w, zero, duals, final, **more):
-        """The solution of branch ``zero``, certified; None if it has none.
-
-        A branch that was solved is not solved again; one that failed is tried once more, without multipliers.
-        """
-        if self.tried(zero):
-            return None
-        key = zero.tobytes()
-        # without multipliers and with all iterations a second attempt is no other one
-        self._attempts[key] += TRIES if final and duals is None else 1
-        last = self._attempts[key] >= TRIES
-        duals = None if last else duals
-        point = self.solutions.certified(w, zero, duals=duals, max_iter=SECOND if final or last else self._first, **more)
-        if point is None and final and duals is not None:
-            point = self.solutions.certified(w, zero, duals=None, **more)
-        if point is not None and point.certificate.grade is not Stationarity.DESCENT:
-            self._attempts[key], self._solved[key] = TRIES, point.f
-        return point
-
-
-def _settles(better, point):
-    """Whether another point is certified and as good, where the descent of this one is too small to count as progress."""
-    return better is not None and better.certificate.certified and better.f <= point.f
-
-
-def is_below(point, enough) -> bool:
-    """Return whether there is a point and its objective is at most ``enough``."""
-    return point is not None and point.f <= enough

@@ -11,7 +11,7 @@ Leaves: a certified one that is more even, or better.
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND, one_of
-from pyomo_fesd.mpcc.algorithm.branches import PROGRESS, is_below
+from pyomo_fesd.mpcc.algorithm.descents import PROGRESS, is_below
 from pyomo_fesd.mpcc.algorithm.neighbours import AT_BOUND
 
 #: A point is more even than another if its deviations are smaller by this part.
@@ -105,7 +105,7 @@ class Evenness:
         """The end of the descent from ``point``."""
         end = point
         while point is not None:
-            end, point = point, self._branches.descend(point, True)
+            end, point = point, self._branches.descents.better(point, True)
         return end
 
     def _unevenness(self, w):

@@ -154,7 +154,7 @@ class Homotopy:
         self._subsolves.note(recovery.note, relaxed.w)
         self._gap.restart()
         if recovery.other_form and self._c.widen() and self._branches is not None:
-            self._branches.forget()
+            self._branches.attempts.forget()
         eps = max(recovery.eps(options.eps_init, position.eps, options.eps_factor), options.eps_final)
         path = (position.path + recovery.other_form) % len(self._paths)
         return _Position(path, recovery.start(self._start, relaxed.w, self), eps)
@@ -180,7 +180,7 @@ class Homotopy:
         self._after(self.run)
         if (explores or nearby) and self._settled(position.named, named):
             return None
-        if self._promises_nothing() or self.finished or (exhausted and explores and self._branches.tried(sets.zero)):
+        if self._promises_nothing() or self.finished or (exhausted and explores and self._branches.attempts.tried(sets.zero)):
             return self._other_path(position, relaxed)
         # no change before eps falls below the largest product
         eps = max(min(position.eps, product) * options.eps_factor, options.eps_final)
@@ -236,7 +236,7 @@ class Homotopy:
         """The first position of another path."""
         self._subsolves.note(why, relaxed.w)
         self._gap.restart()
-        self._branches.forget()
+        self._branches.attempts.forget()
         return _Position(path, self._start, self._options.eps_init)
 
     def _is_limited(self):

@@ -9,9 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from pyomo_fesd.core import DeferredInterrupt, interrupt_handled
-from pyomo_fesd.mpcc.algorithm.branches import PROGRESS, Branches, is_below
+from pyomo_fesd.mpcc.algorithm.branches import Branches
 from pyomo_fesd.mpcc.algorithm.coincidences import Coincidences
 from pyomo_fesd.mpcc.algorithm.completions import Completions
+from pyomo_fesd.mpcc.algorithm.descents import PROGRESS, is_below
 from pyomo_fesd.mpcc.algorithm.evenness import Evenness
 from pyomo_fesd.mpcc.algorithm.feasible_start import feasible_start
 from pyomo_fesd.mpcc.algorithm.gap_test import GapTest
@@ -156,7 +157,8 @@ class HybridSolver:
         point = self.run.point
         if point is None or point.certificate.certified or not self._c.has_objective:
             return
-        had_less = self._branches.be_patient() and point.certificate.grade is Stationarity.DESCENT
+        had_less = not self._branches.attempts.patient and point.certificate.grade is Stationarity.DESCENT
+        self._branches.attempts.patient = True
         if self._take_lowest() or had_less:
             self._finish()
         if self._certify_at_last():
@@ -166,7 +168,7 @@ class HybridSolver:
         """Follow one more path where the incumbent is not certified in the end."""
         if self._completions is None or self._is_certified():
             return
-        self._branches.forget()
+        self._branches.attempts.forget()
         if self._completions.further(self._c.x0):
             self._finish()
             self._try_neighbours_at_last()
@@ -192,7 +194,7 @@ class HybridSolver:
         """Descend from a point that was not worth it on the way, as the homotopy promised better ones that it did not find."""
         point = self.run.point
         if point is not None and point.certificate.grade is Stationarity.DESCENT:
-            self._branches.forget()
+            self._branches.attempts.forget()
             self._branches.improve_from(point, True)
 
     def _settle(self):
@@ -235,7 +237,7 @@ class HybridSolver:
             self._subsolves.note(note, self._c.x0 if w is None else w)
         if w is None:
             return
-        self._branches.forget()
+        self._branches.attempts.forget()
         self._gap.restart()
         self._subsolves.keep_least_infeasible(w)
         self._branches.explore_from(w, True)
@@ -315,7 +317,7 @@ class HybridSolver:
             if hopeless and self._branches.exhaust(start) is not Verdict.FOUND:
                 continue
             self._gap.restart()
-            self._branches.forget()
+            self._branches.attempts.forget()
             self._path(start, self._branches).follow()
             if self.run.point is None:
                 self._branches.search(self.run.w, start)

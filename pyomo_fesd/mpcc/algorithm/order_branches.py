@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.branch_solutions import AS_GOOD, SECOND, as_good, have_same_values
-from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
+from pyomo_fesd.mpcc.algorithm.descents import PROGRESS
 from pyomo_fesd.mpcc.algorithm.orders import NEAR_BOUND
 from pyomo_fesd.mpcc.algorithm.subsolves import INFEASIBLE
 from pyomo_fesd.mpcc.subproblems import ActiveSets, Stationarity

@@ -10,7 +10,7 @@ Leaves: a better point, or a certified one with fewer such places; None if there
 from functools import partial
 
 from pyomo_fesd.mpcc.algorithm.branch_solutions import SECOND, as_good
-from pyomo_fesd.mpcc.algorithm.branches import PROGRESS
+from pyomo_fesd.mpcc.algorithm.descents import PROGRESS
 
 #: Points with objectives as close as this, relative, are the same one, reached in other ways.
 SAME = 1e-8

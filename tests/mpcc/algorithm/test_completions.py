@@ -77,7 +77,7 @@ def test_a_completion_is_kept_as_it_is_if_its_branch_is_no_better():
 
 def test_where_the_best_point_is_not_certified_the_best_solution_is():
     p, rounds, _ = completions(lambda x: (1.0, True))
-    p.branches.descend = lambda point, worth: None
+    p.branches.descents.better = lambda point, worth: None
     none = np.zeros(0, dtype=bool)
     stopped = p.subsolves.branch(np.array(p.point(x=0.9, y=0.0)), np.array([H_ZERO]), none, 0.0, max_iter=0)
     solved = p.subsolves.branch(np.array(p.point(x=0.0, y=0.9)), np.array([G_ZERO]), none, 0.0)

@@ -17,7 +17,7 @@ from scipy.optimize import linprog
 
 import pyomo_fesd
 from pyomo_fesd.mpcc.algorithm import hybrid
-from pyomo_fesd.mpcc.algorithm.branches import Branches
+from pyomo_fesd.mpcc.algorithm.descents import Descents
 from pyomo_fesd.mpcc.algorithm.hybrid import HybridSolver
 from pyomo_fesd.mpcc.algorithm.state import Outcome, Stop
 from pyomo_fesd.mpcc.subproblems import G_ZERO, H_ZERO, Stationarity
@@ -182,7 +182,7 @@ def test_a_hopeless_small_problem_ends_soon(product):
 
 
 def test_a_warm_start_that_ends_uncertified_is_followed_by_the_homotopy(monkeypatch):
-    monkeypatch.setattr(Branches, 'descend', lambda self, point, worth: None)
+    monkeypatch.setattr(Descents, 'better', lambda self, point, worth: None)
     model = small_mpccs.pair(0.5, 0.0)
     model.f = pyo.Objective(expr=(model.x + 1) ** 2 + (model.y - 1) ** 2)
     kinds = [step.kind for step in solve(model, warm_start=True).solver.steps]
