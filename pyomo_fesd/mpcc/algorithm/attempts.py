@@ -34,11 +34,11 @@ class Attempts:
     def point(self, w, zero, duals, final, **more):
         """The solution of branch ``zero``, or of one without the places of least extent that keep it from having one; or None."""
         point = self._point(w, zero, duals, final, **more)
-        return self.without_narrow(zero, final, **more) if point is None else point
+        return self.without_short(zero, final, **more) if point is None else point
 
-    def without_narrow(self, zero, final, **more):
+    def without_short(self, zero, final, **more):
         """A solution without places of least extent that kept the branch ``zero`` from having one; None without any."""
-        end = self._solutions.narrow(zero)
+        end = self._solutions.almost(zero)
         others = [] if end is None else self._neighbours.with_fewer_short(Point(end, np.inf, None))
         found = (self._point(end.w, other, None, final, **more) for other in others)
         return next((point for point in found if point is not None), None)

@@ -25,7 +25,7 @@ ASKED = 2
 NEAR, NEARER = 1e-2, 0.1
 #: A branch with decisions of its sides that leaves a violation below this is one that places of least extent make infeasible: they
 #: are 1e-6 of a usual extent, and what is equal at both of their ends differs by as much.
-NARROW = 1e-5
+ALMOST = 1e-5
 #: A more even solution may cost this much more, relative: the error of uneven elements, not another minimum.
 AS_GOOD = 1e-4
 #: One without places of least extent may cost this much more: the error of uneven ones, of any order.
@@ -85,7 +85,7 @@ class BranchSolutions:
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
         self.at_once, self._known, self._certified = at_once and self._c.eta.numel() > 0, {}, defaultdict(list)
-        self._narrow = {}
+        self._almost = {}
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -104,9 +104,9 @@ class BranchSolutions:
             self._known[key] = found = self._solution(w, zero, duals, below, **more)
         return self._point(found, below, enough)
 
-    def narrow(self, zero):
-        """The end of the NLP of a branch that left a violation below ``NARROW``; None if none did."""
-        return self._narrow.get(zero.tobytes())
+    def almost(self, zero):
+        """The end of the NLP of a branch that left a violation below ``ALMOST``; None if none did."""
+        return self._almost.get(zero.tobytes())
 
     def up_to(self, enough, suits=lambda f, w: True):
         """Yield the certified ones of the solutions found so far that suit and are at most ``enough``, the best first."""
@@ -218,8 +218,8 @@ class BranchSolutions:
             return None, None
         if self._subsolves.usable(first):
             return self._with_all(first, zero, equal, **more)
-        if self._subsolves.violation(first.w) <= NARROW:
-            self._narrow[zero.tobytes()] = first
+        if self._subsolves.violation(first.w) <= ALMOST:
+            self._almost[zero.tobytes()] = first
         return self._decided_from_afar(w, zero, equal, first, **more)
 
     def _decided_from_afar(self, w, zero, equal, first, **more):

@@ -215,7 +215,7 @@ class Branches:
     def _release(self, point):
         zero = self._subsolves.sets(point.w, self._tolerances.biactive).zero
         released = self.solutions.certified(point.w, zero, max_iter=SECOND)
-        self.improve_from(self.attempts.without_narrow(zero, True) if released is None else released, True)
+        self.improve_from(self.attempts.without_short(zero, True) if released is None else released, True)
 
     def search(self, *starts):
         """Search for any feasible branch: by the LPEC with every pair as a binary, then depth first over the pairs."""

@@ -45,7 +45,7 @@ def test_a_first_attempt_has_the_iterations_of_the_second_one_with_patience():
     assert (before, p.branches.attempts.first) == (branch_solutions.FIRST, branch_solutions.SECOND)
 
 
-@pytest.mark.parametrize('violation, found', [(2 * branch_solutions.NARROW, False), (branch_solutions.NARROW / 2, True)])
+@pytest.mark.parametrize('violation, found', [(2 * branch_solutions.ALMOST, False), (branch_solutions.ALMOST / 2, True)])
 def test_a_branch_that_places_of_least_extent_make_infeasible_is_solved_without_them(monkeypatch, violation, found):
     p = jump_inside_a_stage()
     p.branches.solutions.at_once = True
