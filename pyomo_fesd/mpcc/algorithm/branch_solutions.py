@@ -23,8 +23,8 @@ MORE = {FIRST: SECOND, SECOND: None}
 ASKED = 2
 #: A failed attempt came near if it leaves a violation of the rows below this, or has reduced it to this part.
 NEAR, NEARER = 1e-2, 0.1
-#: A branch with decisions of its sides that leaves a violation below this is one that places of least extent make infeasible: they
-#: are 1e-6 of a usual extent, and what is equal at both of their ends differs by as much.
+#: A branch with decisions of its sides that leaves a violation below this may be one that places of least extent make infeasible:
+#: they are 1e-6 of a usual extent, and what is equal at both of their ends differs by as much.
 ALMOST = 1e-5
 #: A more even solution may cost this much more, relative: the error of uneven elements, not another minimum.
 AS_GOOD = 1e-4

@@ -182,7 +182,7 @@ class Branches:
 
     def _is_progress(self, before, part):
         """Whether the incumbent is better than a point ``before`` by this relative part."""
-        return self.run.point.f < before.f - part * max(1.0, abs(before.f))
+        return self.run.point.f < before.less(part)
 
     def _widen_from(self, end):
         """Go on from a point below the incumbent that only bounds of the method keep from descending.
@@ -191,22 +191,26 @@ class Branches:
         """
         if end is None or end.certificate.grade is not Stationarity.LIMITED:
             return
-        incumbent = self.run.point
-        enough = incumbent.f - PROGRESS * max(1.0, abs(incumbent.f))
-        if not is_below(end, enough):
+        if not is_below(end, self.run.point.less(PROGRESS)):
             return
         if self._c.widen():
             self._release(end)
         elif self.solutions.at_once:
-            self._pass_bounds(end, enough)
+            self._pass_bounds(end)
 
-    def _pass_bounds(self, end, enough):
+    def _pass_bounds(self, end):
         """Go on in the branches without the variables of ``end`` at their lower bound until the incumbent is better."""
         incumbent = self.run.point
-        for zero in self.neighbours.beside_short(end):
-            self.improve_from(self.solutions.certified(end.w, zero, max_iter=SECOND, below=incumbent.f, enough=enough), True)
+        for found in self.beside_short(end, incumbent):
+            self.improve_from(found, True)
             if self._is_progress(incumbent, PROGRESS):
                 return
+
+    def beside_short(self, point, worse):
+        """Yield solutions, better than a ``worse`` point, of the branches without variables of ``point`` at their lower bound."""
+        more = {'max_iter': SECOND, 'below': worse.f, 'enough': worse.less(PROGRESS)}
+        found = (self.solutions.certified(point.w, zero, **more) for zero in self.neighbours.beside_short(point))
+        return (other for other in found if other is not None)
 
     def release(self):
         """Go on from the incumbent, which guide bounds kept from descending, after these have been widened."""

@@ -163,7 +163,7 @@ class Completions:
                 return
 
     def _best_is_below(self, before):
-        return self._best.f < before.f - PROGRESS * max(1.0, abs(before.f))
+        return self._best.f < before.less(PROGRESS)
 
     def _cycle(self):
         """A round for each eps from the best point; and one on from the first relaxation, where all of these only promise more."""

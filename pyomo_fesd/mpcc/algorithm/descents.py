@@ -45,7 +45,7 @@ class Descents:
 
     def better(self, point, worth):
         """A better point, or None; a point that is not ``worth`` a descent only gets the check of its certificate."""
-        enough = _below(point, PROGRESS if point.nlp.solved else UNFINISHED)
+        enough = point.less(PROGRESS if point.nlp.solved else UNFINISHED)
         if point.certificate.grade is Stationarity.DESCENT:
             return self._step_down(point, enough) if worth else None
         if point.certificate.grade is not Stationarity.B:
@@ -89,7 +89,7 @@ class Descents:
         """
         w, incumbent = point.w, self._run.point
         if self._solutions.at_once and incumbent is not None and incumbent.certificate.certified:
-            enough = min(enough, _below(point, UNEVEN))
+            enough = min(enough, point.less(UNEVEN))
         sets = self._subsolves.sets(w, self._tolerances.biactive)
         for radius in radii:
             step = self._subsolves.lpec(w, sets, radius, point.equal, limits=self._subsolves.patience())
@@ -99,7 +99,7 @@ class Descents:
             within = {'box': (w - reach, w + reach), 'max_iter': self._attempts.first}
             better = self._solutions.certified(w + step.d, step.zero, below=point.f, **within)
             if is_below(better, enough) or _settles(better, point):
-                return replace(better, reach=radius if is_below(better, _below(point, FALL)) else None)
+                return replace(better, reach=radius if is_below(better, point.less(FALL)) else None)
         return None
 
     def _beyond(self, point, enough, tolerance, clear, limits=None):
@@ -114,11 +114,6 @@ class Descents:
         if not step.solved or step.descent <= clear:
             return None
         return self._attempts.point(point.w + step.d, step.zero, None, False, enough=enough)
-
-
-def _below(point, part):
-    """The objective of a point, less this relative part."""
-    return point.f - part * max(1.0, abs(point.f))
 
 
 def _settles(better, point):

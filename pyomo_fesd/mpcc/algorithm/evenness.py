@@ -73,7 +73,7 @@ class Evenness:
         Small variables are the first to change sides.
         """
         candidates = [n for n in self._c.neighbours if n.short.size]
-        enough = point.f - PROGRESS * max(1.0, abs(point.f))
+        enough = point.less(PROGRESS)
         for neighbour in sorted(candidates, key=lambda n: point.w[n.short].max()):
             zero = self._branches.neighbours.zero_sides(point, neighbour, always=True)
             if zero is None or zero.tobytes() in tried:

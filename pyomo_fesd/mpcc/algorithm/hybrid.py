@@ -185,7 +185,7 @@ class HybridSolver:
     def _take_lowest(self):
         """Make the lowest point the incumbent, if that is not certified and clearly above; returns whether it was."""
         point, lowest = self.run.point, self.run.lowest
-        if lowest is None or point.certificate.certified or not is_below(lowest, point.f - PROGRESS * max(1.0, abs(point.f))):
+        if lowest is None or point.certificate.certified or not is_below(lowest, point.less(PROGRESS)):
             return False
         self.run.point = lowest
         return True

@@ -155,7 +155,7 @@ class OrderBranches:
 
         SETTLED where the solution of the branch leads back to the incumbent.
         """
-        enough = point.f - PROGRESS * max(1.0, abs(point.f))
+        enough = point.less(PROGRESS)
         most = as_good(point, None) if self._branches.solutions.at_once else point.f
         for start in starts:
             found = self._branches.solutions.certified(start, zero, max_iter=SECOND, below=most)

@@ -10,7 +10,6 @@ Leaves: a better point, or a certified one with fewer such places; None if there
 from functools import partial
 
 from pyomo_fesd.mpcc.algorithm.branch_solutions import SECOND, as_good
-from pyomo_fesd.mpcc.algorithm.descents import PROGRESS
 
 #: Points with objectives as close as this, relative, are the same one, reached in other ways.
 SAME = 1e-8
@@ -34,12 +33,7 @@ class ShortPlaces:
 
     def better(self, point):
         """A better point in a neighbouring branch for a variable of ``point`` at its lower bound; None if there is none."""
-        enough = point.f - PROGRESS * max(1.0, abs(point.f))
-        for zero in self._neighbours.beside_short(point):
-            found = self._solutions.certified(point.w, zero, max_iter=SECOND, below=point.f, enough=enough)
-            if found is not None:
-                return found
-        return None
+        return next(self._branches.beside_short(point, point), None)
 
     def leave_out(self, point):
         """Do not return this point: its orders have been tried, and one of them may lead to the point that asks for another."""

@@ -159,6 +159,10 @@ class Point:
         """Values of the variables."""
         return self.nlp.w
 
+    def less(self, part: float) -> float:
+        """Return the objective less a part of it, relative above 1."""
+        return self.f - part * max(1.0, abs(self.f))
+
 
 @dataclass
 class Run:

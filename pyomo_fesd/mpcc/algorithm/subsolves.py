@@ -43,7 +43,7 @@ STEEP, STEEPEST_ROW = 1e2, 1e4
 #: How the names of Ipopt's options of this scaling begin.
 OF_SCALING = 'nlp_scaling', 'obj_scaling'
 #: Ipopt's barrier parameter where a relaxation beside impacts starts with multipliers: its adaptive one follows them to worse
-#: points (a hopper at eps 6e-6: to 15.1, and this one was at 7.6).  MacMPEC took a quarter more iterations with it.
+#: points (a hopper at eps 6e-6: to 15.1, and this one was at 7.6).
 CENTRED = {'mu_strategy': 'monotone', 'mu_init': 1e-3}
 #: Statuses with which a point is of no use, whatever its violation.
 USELESS = (*INFEASIBLE, DIVERGING)

@@ -73,11 +73,11 @@ def test_a_problem_without_parts_has_ipopts_own_scaling(budgets):
     assert budgets and not any('nlp_scaling_max_gradient' in budget for _, budget in budgets)
 
 
-def solve_ball(**options):
+def solve_ball():
     """Solve a ball that bounces, without a simulation before."""
     m = contacts.ball(0.5)
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=4, ncp=2)
-    pyo.SolverFactory('mpec_hybrid').solve(m, simulate_first=False, **options)
+    pyo.SolverFactory('mpec_hybrid').solve(m, simulate_first=False)
 
 
 def test_beside_impacts_ipopt_scales_as_ever(budgets):
