@@ -27,9 +27,10 @@ from pyomo_fesd.mpcc.subproblems import (
 #: With both sides within this factor of the root of the largest product, a pair is undecided.
 BIACTIVE = 3.0
 #: HiGHS for an LPEC that only suggests a branch: the first solution is enough, in this share of the time that the NLPs took.  The
-#: least time is several times what programs of few pairs need: on a loaded machine their searches end as on an idle one.
+#: least time is four times what a tank's with a binary for every pair takes (with 0.5 s its plan depended on other work of the
+#: machine; MacMPEC and NOSBENCH take the same time with both).
 SUGGESTION = {'mip_max_nodes': 100, 'mip_max_improving_sols': 1, 'presolve': 'off'}
-SHARE, LEAST_TIME = 0.2, 0.5
+SHARE, LEAST_TIME = 0.2, 2.0
 #: Least seconds for the LPECs of an order: without their answer no point is certified, and a loaded machine should not decide that.
 ORDER_TIME = 5.0
 #: Statuses of a problem that an NLP solver found infeasible: the model's own rows may hold there, the pairs do not.
@@ -67,11 +68,11 @@ class Subsolves:
 
     # called by the algorithm
 
-    def relax(self, form, w, eps, duals, max_iter=None):
+    def relax(self, form, w, eps, duals, max_iter=None, fall=None):
         """Solve Reg(eps) in a form of ``RELAXATIONS``, from ``w`` and perhaps a result of the same form."""
         kind, terms = RELAXATIONS[form]
         nlp = self._build(form, lambda make: kind(self._c, self._sides, terms, make), 'relaxation')
-        return self._nlp('relaxation', eps, lambda: nlp.solve(w, eps, duals, max_iter))
+        return self._nlp('relaxation', eps, lambda: nlp.solve(w, eps, duals, max_iter, fall))
 
     def restore(self, w, eps):
         """Solve the restoration NLP."""

@@ -7,4 +7,4 @@ with ``sx_to_pyomo``.  A new solver is a subclass of ``NlpSolver`` with a row in
 
 from pyomo_fesd.mpcc.nlp.casadi_solvers import PlainIpopt
 from pyomo_fesd.mpcc.nlp.deadline import Deadline, OutOfTime
-from pyomo_fesd.mpcc.nlp.solver import DIVERGING, NEWTON, STALLED, NlpResult, Stall, check_options, nlp_solver
+from pyomo_fesd.mpcc.nlp.solver import DIVERGING, NEWTON, STALLED, Fall, NlpResult, Stall, check_options, nlp_solver

@@ -70,18 +70,39 @@ class _Violations:
         return len(self._least) == self._least.maxlen and self._least[-1] > max(VIOLATED, self._least[0] / 2)
 
 
+class _Limit:
+    """The limit of iterations of a call, which waits as long as the objective falls (``Fall``)."""
+
+    def __init__(self, max_iter, fall):
+        self._most, self._fall, self._number = np.inf if max_iter is None else max_iter, fall, 0
+        self._objectives = deque(maxlen=1 if fall is None else fall.iterations + 1)
+
+    def add(self, objective):
+        self._number += 1
+        self._objectives.append(objective)
+
+    @property
+    def is_reached(self):
+        return self._number > self._most and not (self._falls and self._number <= self._fall.times * self._most)
+
+    @property
+    def _falls(self):
+        first, last, is_full = self._objectives[0], self._objectives[-1], len(self._objectives) == self._objectives.maxlen
+        return self._fall is not None and is_full and last < first - self._fall.part * abs(first)
+
+
 class _StopCallback(ca.Callback):
     """Asks the solver to stop at the deadline, at the limits of a call, or at Ctrl-C."""
 
     def __init__(self, n, m, p, deadline):
         super().__init__()
         self._sizes, self._deadline, self.interrupt = (n, m, p), deadline, DeferredInterrupt()
-        self._g, self._lam_g = map(ca.nlpsol_out().index, ('g', 'lam_g'))
+        self._f, self._g, self._lam_g = map(ca.nlpsol_out().index, ('f', 'g', 'lam_g'))
         self.construct('watch', {})
 
-    def begin(self, max_iter, steepest, stalls, lbg, ubg):
+    def begin(self, max_iter, steepest, stalls, fall, lbg, ubg):
         """Begin a call with its limits."""
-        self._left, self._steepest, self._running = np.inf if max_iter is None else max_iter, steepest, 0
+        self._limit, self._steepest, self._running = _Limit(max_iter, fall), steepest, 0
         self._violations = [_Violations(limit) for limit in stalls]
         self._lbg, self._ubg = (np.asarray(bound, dtype=float) for bound in (lbg, ubg))
 
@@ -106,10 +127,11 @@ class _StopCallback(ca.Callback):
         return True
 
     def eval_buffer(self, arg, res):
-        self._left -= 1
+        # Uno does not show its objective
+        self._limit.add(np.nan if arg[self._f] is None else arg[self._f].cast('d')[0])
         if self._steepest < np.inf or self._violations:
             self._look_at(*(np.frombuffer(arg[i].cast('B')) for i in (self._g, self._lam_g)))
-        res[0].cast('d')[0] = self._left < 0 or bool(self.status) or self._deadline.expired() or self.interrupt.pressed
+        res[0].cast('d')[0] = self._limit.is_reached or bool(self.status) or self._deadline.expired() or self.interrupt.pressed
         return 0
 
     def _look_at(self, g, lam_g):
@@ -179,10 +201,10 @@ class _CasadiNlp(NlpSolver):
             self._made[warm] = ca.nlpsol(self._name, self.PLUGIN, self._problem, settings)
         return self._made[warm]
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=(), fall=None):
         """Solve from ``w0``; see ``NlpSolver``."""
         solver = self._solver_for(duals is not None)
-        self._watch.begin(max_iter, steepest, stalls, lbg, ubg)
+        self._watch.begin(max_iter, steepest, stalls, fall, lbg, ubg)
         start = {} if duals is None else {'lam_x0': duals.lam_x, 'lam_g0': duals.lam_g}
         given = {'x0': w0, 'p': p, 'lbx': lbx, 'ubx': ubx, 'lbg': lbg, 'ubg': ubg} | start
         with DeferredInterrupt() as self._watch.interrupt:
@@ -242,7 +264,7 @@ class CasadiUno(_CasadiNlp):
         self._varying, self._g = rows_with_variables(g, x), ca.Function('g', [x, p], [ca.densify(g)])
         super().__init__(name, x, p, f, g[np.flatnonzero(self._varying).tolist()], budget, deadline, derivatives, options, warm)
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=(), fall=None):
         """Solve from ``w0``; see ``NlpSolver``."""
         varying = self._varying
         g, lam_g = self._g(w0, p).full().ravel(), np.zeros(len(varying))
@@ -250,7 +272,7 @@ class CasadiUno(_CasadiNlp):
             return self._failed(w0, p, len(varying), 'infeasible')
         if duals is not None:
             duals = replace(duals, lam_g=duals.lam_g[varying])
-        result = super().solve(w0, p, lbx, ubx, lbg[varying], ubg[varying], duals, max_iter, steepest, stalls)
+        result = super().solve(w0, p, lbx, ubx, lbg[varying], ubg[varying], duals, max_iter, steepest, stalls, fall)
         lam_g[varying] = result.lam_g
         return replace(result, lam_g=lam_g)
 

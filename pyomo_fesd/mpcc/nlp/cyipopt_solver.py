@@ -111,8 +111,8 @@ class CyIpopt(NlpSolver):
         self._options = _accepted(tuple((IPOPT | budget).items())) | options
         self._warm = _accepted(tuple(((warm or {}) | IPOPT_WARM).items())) | options
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
-        """Solve from ``w0``; see ``NlpSolver``.  Older Ipopts do not show multipliers on their way."""
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=(), fall=None):
+        """Solve from ``w0``; see ``NlpSolver``.  Older Ipopts show neither multipliers nor their objective on their way."""
         callbacks = self._callbacks
         callbacks.p, callbacks.iterations = p, 0
         problem = cyipopt.Problem(n=len(lbx), m=len(lbg), problem_obj=callbacks, lb=lbx, ub=ubx, cl=lbg, cu=ubg)

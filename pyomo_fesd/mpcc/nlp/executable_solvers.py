@@ -82,7 +82,7 @@ class Executable(NlpSolver):
             reads_nl = hasattr(solver, 'problem_format') and solver.problem_format() == ProblemFormat.nl
         return None if reads_nl else "Pyomo's solver of this name does not read NL files"
 
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=(), fall=None):
         """Solve from ``w0``; see ``NlpSolver``.  Multipliers to start from are not used, and none are shown on the way."""
         left = self._deadline.left()
         if left == 0.0:

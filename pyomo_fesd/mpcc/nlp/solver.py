@@ -119,6 +119,17 @@ class Stall(NamedTuple):
     below: float = np.inf
 
 
+class Fall(NamedTuple):
+    """As long as the objective falls by this ``part`` of itself in so many ``iterations``, ``max_iter`` does not end a solve.
+
+    So many ``times`` of ``max_iter`` do in any case.
+    """
+
+    part: float
+    iterations: int
+    times: float
+
+
 class NlpSolver(ABC):
     """``min f(w; p)  s.t.  lbg <= g(w; p) <= ubg, lbx <= w <= ubx``, built once, for changing bounds and parameter p.
 
@@ -153,7 +164,7 @@ class NlpSolver(ABC):
         pass
 
     @abstractmethod
-    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=()):
+    def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=(), fall=None):
         """Solve from ``w0``; an unsolved problem gives a status, never an error.
 
         Infinite bounds are ``np.inf``; a row or variable with two of them is free, one with equal bounds is an equation or fixed.
@@ -169,6 +180,8 @@ class NlpSolver(ABC):
         stalls : sequence of Stall
             how the largest violation of a row has to shrink, where the solver shows it; if it does not, the solve ends as
             ``STALLED``
+        fall : Fall, optional
+            when ``max_iter`` does not end the solve, where the solver shows the objective on its way
 
         Returns
         -------

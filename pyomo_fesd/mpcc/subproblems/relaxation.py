@@ -105,8 +105,8 @@ class Relaxation:
         limit = {'diverging_iterates_tol': DIVERGES * max(1.0, float(np.abs(c.x0).max(initial=0.0)))}
         self._nlp = make(form.__name__, nlp.x, nlp.p, nlp.f, nlp.g, LEADING | limit, nlp.derivatives)
 
-    def solve(self, w, eps, duals=None, max_iter=None):
-        """Solve from ``w``, with the multipliers of an earlier result of this form if given."""
+    def solve(self, w, eps, duals=None, max_iter=None, fall=None):
+        """Solve from ``w``, with the multipliers of an earlier result of this form if given; limits as ``NlpSolver.solve``."""
         c = self._c
         lbx, ubx, lbg, ubg = c.lbx.copy(), c.guide_ubx.copy(), self._lbg.copy(), self._ubg.copy()
         # such are distances that are zero; with shares that are one fixed too, a path of nosbench ended in a worse minimum
@@ -115,7 +115,7 @@ class Relaxation:
             at = c.evaluate(w)
             w = np.append(w, min(1.0, (at.G * at.H).max(initial=0.0) + ROOM))
             lbx, ubx = np.append(lbx, 0.0), np.append(ubx, np.inf)
-        result = self._nlp.solve(w, [eps, *c.parameters], lbx, ubx, lbg, ubg, duals, max_iter)
+        result = self._nlp.solve(w, [eps, *c.parameters], lbx, ubx, lbg, ubg, duals, max_iter, fall=fall)
         return result.shortened(len(c.x0))
 
 
@@ -132,13 +132,13 @@ class Penalty(Relaxation):
         super().__init__(c, sides, form, make)
         self._rho = self.START
 
-    def solve(self, w, eps, duals=None, max_iter=None):
+    def solve(self, w, eps, duals=None, max_iter=None, fall=None):
         """Solve from ``w`` with the weight that brings every product to ``eps``; without multipliers a new path begins."""
         if duals is None:
             self._rho = self.START
         spent = 0
         while True:
-            result = super().solve(w, 1 / self._rho, duals, max_iter)
+            result = super().solve(w, 1 / self._rho, duals, max_iter, fall)
             spent += result.iterations
             at = self._c.evaluate(result.w)
             if not result.solved or (at.G * at.H).max(initial=0.0) <= eps or self._rho >= self.LIMIT:

@@ -9,7 +9,7 @@ import pytest
 from problems import small_mpccs
 from problems.parts import parts
 
-from pyomo_fesd.mpcc.algorithm.completions import AROUND, Completions
+from pyomo_fesd.mpcc.algorithm.completions import AROUND, FALL, Completions
 from pyomo_fesd.mpcc.nlp import STALLED
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
 from pyomo_fesd.mpcc.subproblems import G_ZERO, H_ZERO
@@ -46,9 +46,10 @@ def one_stopped(p, monkeypatch, number=1):
     """Let the relaxation with this number end at its limit; returns the list of form, eps and limit of all, which grows."""
     relax, asked = p.subsolves.relax, []
 
-    def stopped(form, w, eps, duals, most):
+    def stopped(form, w, eps, duals, most, fall):
+        assert fall is FALL
         asked.append((form, eps, most))
-        result = relax(form, w, eps, duals, most)
+        result = relax(form, w, eps, duals, most, fall)
         return replace(result, status='User_Requested_Stop') if len(asked) == number else result
 
     monkeypatch.setattr(p.subsolves, 'relax', stopped)

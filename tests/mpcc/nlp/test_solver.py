@@ -19,6 +19,7 @@ from pyomo_fesd.mpcc.nlp.solver import (
     RUNNING,
     SOLVED,
     STALLED,
+    Fall,
     NlpResult,
     NlpSolver,
     Stall,
@@ -171,6 +172,17 @@ def test_a_violation_that_does_not_halve_ends_the_solve(constant, stall, is_left
     result = problem.solve(np.array([2.0]), [], np.array([-INF]), np.array([INF]), np.zeros(1), np.zeros(1), stalls=stalls)
     assert (result.status == STALLED) == is_left
     assert not is_left or (result.stopped and not result.solved)
+
+
+@pytest.mark.parametrize(
+    ('fall', 'iterations'), [(None, 5), (Fall(0.9, 3, 4.0), 20), (Fall(0.99, 3, 4.0), 5), (Fall(0.9, 8, 4.0), 5)], ids=str
+)
+def test_a_limit_of_iterations_waits_while_the_objective_falls(fall, iterations):
+    # each of Newton's iterations takes the objective to (15/16)^16, three of them to 4.5 percent
+    x, p = ca.SX.sym('x'), ca.SX(0, 1)
+    problem = nlp_solver('ipopt')('flat', x, p, x**16, ca.SX(0, 1), {'max_iter': 300})
+    result = problem.solve(np.array([10.0]), [], np.array([-INF]), np.array([INF]), np.zeros(0), np.zeros(0), None, 5, fall=fall)
+    assert result.stopped and result.iterations == pytest.approx(iterations, abs=1)
 
 
 def test_options_of_the_user_pass_through_and_win(solver):
