@@ -112,7 +112,7 @@ class CyIpopt(NlpSolver):
         self._warm = _accepted(tuple(((warm or {}) | IPOPT_WARM).items())) | options
 
     def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=(), fall=None):
-        """Solve from ``w0``; see ``NlpSolver``.  Older Ipopts show neither multipliers nor their objective on their way."""
+        """Solve from ``w0``; see ``NlpSolver``.  Older Ipopts do not show multipliers on their way; ``fall`` is not used."""
         callbacks = self._callbacks
         callbacks.p, callbacks.iterations = p, 0
         problem = cyipopt.Problem(n=len(lbx), m=len(lbg), problem_obj=callbacks, lb=lbx, ub=ubx, cl=lbg, cu=ubg)

@@ -181,7 +181,7 @@ class NlpSolver(ABC):
             how the largest violation of a row has to shrink, where the solver shows it; if it does not, the solve ends as
             ``STALLED``
         fall : Fall, optional
-            when ``max_iter`` does not end the solve, where the solver shows the objective on its way
+            when ``max_iter`` does not end the solve yet; with casadi's Ipopt only
 
         Returns
         -------
