@@ -87,12 +87,13 @@ def declare_impacts(moving: MovingGrid, laws: list[ContactLaw], block: Block) ->
 def with_departures(moving: MovingGrid, conditions: list[TimeComplementarity]) -> list[TimeComplementarity]:
     """Return the conditions, those of contact forces with Q: closed only from a boundary on at which the bodies do not part.
 
-    Bodies that must not slip have no restitution, so that an impulse leaves no velocity with which they part.
+    Otherwise bodies could meet with a velocity with which they part, having been below the surface between two collocation points,
+    and the forces of the closed element would take it away.
     """
     impacts = None if moving.state_jumps is None else moving.state_jumps.impacts
     if impacts is None:
         return conditions
-    laws = {id(touching): law for law in impacts.laws if not law.sticking for touching in law.touching.values()}
+    laws = {id(touching): law for law in impacts.laws for touching in law.touching.values()}
     return [_with_departures(impacts, c, laws.get(id(next(iter(c.conditions.values())))), moving.grid) for c in conditions]
 
 

@@ -85,7 +85,7 @@ class BranchSolutions:
     def __init__(self, subsolves, at_once=False):
         self._c, self._tolerances, self._subsolves = subsolves.compiled, subsolves.tolerances, subsolves
         self.at_once, self._known, self._certified = at_once and self._c.eta.numel() > 0, {}, defaultdict(list)
-        self._almost = {}
+        self._failed = {}
 
     def certified(self, w, zero, duals=None, below=np.inf, enough=np.inf, **more):
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
@@ -104,9 +104,10 @@ class BranchSolutions:
             self._known[key] = found = self._solution(w, zero, duals, below, **more)
         return self._point(found, below, enough)
 
-    def almost(self, zero):
-        """The end of the NLP of a branch that left a violation below ``ALMOST``; None if none did."""
-        return self._almost.get(zero.tobytes())
+    def failed(self, zero, most):
+        """The end of the NLP of a branch that has failed and left a violation of at most ``most``; None if there is none."""
+        end = self._failed.get(zero.tobytes())
+        return None if end is None or self._subsolves.violation(end.w) > most else end
 
     def up_to(self, enough, suits=lambda f, w: True):
         """Yield the certified ones of the solutions found so far that suit and are at most ``enough``, the best first."""
@@ -218,8 +219,7 @@ class BranchSolutions:
             return None, None
         if self._subsolves.usable(first):
             return self._with_all(first, zero, equal, **more)
-        if self._subsolves.violation(first.w) <= ALMOST:
-            self._almost[zero.tobytes()] = first
+        self._failed[zero.tobytes()] = first
         return self._decided_from_afar(w, zero, equal, first, **more)
 
     def _decided_from_afar(self, w, zero, equal, first, **more):

@@ -163,6 +163,7 @@ class HybridSolver:
             self._finish()
         if self._certify_at_last():
             self._finish()
+        self._try_neighbours_at_last()
 
     def _try_further_at_last(self):
         """Follow one more path where the incumbent is not certified in the end."""

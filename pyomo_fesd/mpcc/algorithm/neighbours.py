@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pyomo_fesd.mpcc.algorithm.moves import differs, with_moves
+from pyomo_fesd.mpcc.algorithm.state import Point
 from pyomo_fesd.mpcc.subproblems import ActiveSets
 
 #: A variable nearer to its lower bound than this is at it.
@@ -58,6 +59,24 @@ class Neighbours:
         """Whether a neighbouring branch is one of this point: a variable is at its lower bound, if it asks for that."""
         short = neighbour.short
         return not short.size or bool(np.any(point.w[short] <= self._c.lbx[short] + AT_BOUND))
+
+    def pull(self, nlp, zero) -> float:
+        """Return how strongly the end of a branch NLP pulls towards the neighbouring branch ``zero``.
+
+        This is the sum of the multipliers by which variables that its own branch keeps at a bound, and the other one does not,
+        would leave it: how much the objective falls, to first order, as each grows by 1.  Without a solution it is the violation
+        that they would reduce.
+        """
+        own = self._subsolves.held(nlp.w, self._subsolves.sets(nlp.w, self._biactive).zero)
+        released = np.where(self._subsolves.held(nlp.w, zero) == 0, own, 0)
+        return float(np.maximum(released * nlp.lam_x[: len(released)], 0.0).sum())
+
+    def pulling(self, nlp, least) -> list[np.ndarray]:
+        """Return the zero sides of the neighbouring branches that the end of a branch NLP pulls to, the strongest pull first."""
+        point = Point(nlp, np.inf, None)
+        sides = (self.zero_sides(point, neighbour, always=True) for neighbour in self.all)
+        found = [(self.pull(nlp, zero), zero) for zero in sides if zero is not None]
+        return [zero for pull, zero in sorted(found, key=lambda one: -one[0]) if pull > least]
 
     def number_of_short(self, w) -> int:
         """Return how many variables are at their lower bound, of those for which there are neighbouring branches."""

@@ -227,6 +227,11 @@ class Subsolves:
         """The assignment of the branch ``zero`` that starts at ``w``."""
         return settle(self._c, self._sides, w, zero)
 
+    def held(self, w, zero):
+        """For each variable the bound at which the branch ``zero`` keeps it at ``w``: 1 the lower one, -1 the upper one, 0 none."""
+        low, high = self._sides.bounds(self.settled(w, zero), self._c.lbx, self._c.ubx)
+        return np.where(low == high, (high < self._c.ubx).astype(int) - (low > self._c.lbx), 0)
+
     def biactive(self, at):
         """Below this both sides of a pair may be zero at the solution: O(sqrt) of the largest product left (eq. 16)."""
         return max(BIACTIVE * np.sqrt(np.max(at.G * at.H, initial=0.0)), self.tolerances.biactive)
