@@ -24,8 +24,9 @@ SUGGESTED = 50
 #: A pull to a neighbouring branch below this, relative to the objective, leads nowhere: of 90 neighbours of hoppers those that were
 #: better had at least 1 (or were the same point), and half of the others less than 0.1.
 WEAK = 0.1
-#: Neighbours of a branch that a relaxation names, and that leaves a violation below this, are worth more than the next relaxation.
-FAR = 1.0
+#: Neighbours of a branch that a relaxation names are worth more than the next relaxation where the branch leaves a violation below
+#: the first number, and its objective is not above the relaxation's by more than the second, relative.
+FAR, ABOVE = 1.0, 1.0
 #: Trust region of the LPEC that searches for any feasible branch.
 SEARCH_RADIUS = 1e3
 
@@ -78,7 +79,8 @@ class Branches:
         float or None
             the objective of the branch that the sets name, if it has a certified solution
         """
-        point = self.attempts.point(relaxed.w, sets.zero, relaxed, final, most=FAR)
+        f = self._c.evaluate(relaxed.w).f
+        point = self.attempts.point(relaxed.w, sets.zero, relaxed, final, most=FAR, worth=f + ABOVE * abs(f))
         if point is None and 0 < np.count_nonzero(sets.gamma) <= SUGGESTED and self._c.has_objective:
             step = self._subsolves.suggestion(relaxed.w, sets, self._tolerances.radius)
             if step.solved:

@@ -21,6 +21,10 @@ AUTO = {
     False: (('elastic', 'elastic'), ('scholtes', 'scholtes')),
     True: (('elastic', 'elastic'), ('scholtes', 'elastic'), ('scholtes', 'scholtes')),
 }
+#: Beside impacts a second elastic path begins at this part of the first eps.  Where a penalty leads up, from one late relaxation to
+#: the next by more than the other number, relative, and no branch has a solution, it begins at once: such a path ends high and late
+#: (a hopper whose relaxations rose from 7 to 20 had its first point after 65 s).
+FIRMER, RISE = 0.1, 0.25
 #: From this eps on multipliers are kept as a start; before, Ipopt's own centring finds better minima (a car: 13.3, not 16).
 WITH_MULTIPLIERS = 1e-2
 #: From this eps on a relaxation is worth a branch NLP, which is much cheaper than the next relaxation, unless more than this part
@@ -39,7 +43,8 @@ ROUND_OFF = 1.001
 @dataclass(frozen=True)
 class _Position:
     """A position: the path's number, start and eps; form, result and active sets of the relaxation before, and the objective of
-    the branch that they named; whether the relaxation goes on from where its budget of iterations ended.
+    the branch that they named; whether the relaxation goes on from where its budget of iterations ended; the objective of the
+    relaxation before.
     """
 
     path: int
@@ -50,6 +55,7 @@ class _Position:
     sets: ActiveSets = None
     named: float = None
     goes_on: bool = False
+    f: float = np.inf
 
 
 class Homotopy:
@@ -77,7 +83,9 @@ class Homotopy:
         self._c, self._options, self._after = setup.compiled, setup.options, setup.after
         self._subsolves, self._gap, self._branches, self._start, self.run = subsolves, gap, branches, start, subsolves.run
         form = self._options.relaxation
-        self._paths = AUTO[self._c.has_objective] if form == 'auto' else ((form,) * 2,)
+        self._paths = [(1.0, *forms) for forms in (AUTO[self._c.has_objective] if form == 'auto' else ((form,) * 2,))]
+        if self._c.impacts and self._c.has_objective and form == 'auto':
+            self._paths.insert(1, (FIRMER, *AUTO[True][0]))
         self._recoveries = list(RECOVERIES)
         self._position, self._cold = _Position(0, start, self._options.eps_init), {}
         self.end, self.finished = None, False
@@ -129,7 +137,7 @@ class Homotopy:
         return last_cold or 'max_iter' in self._options.nlp_options
 
     def _form(self, position):
-        first, later = self._paths[position.path]
+        _, first, later = self._paths[position.path]
         return first if position.form is None else later
 
     def restored(self, w):
@@ -180,11 +188,19 @@ class Homotopy:
         self._after(self.run)
         if (explores or nearby) and self._settled(position.named, named):
             return None
+        if self._leads_up(position, at.f):
+            return self._begin(position.path + 1, "leads up, start again", relaxed)
         if self._promises_nothing() or self.finished or (exhausted and explores and self._branches.attempts.tried(sets.zero)):
             return self._other_path(position, relaxed)
         # no change before eps falls below the largest product
         eps = max(min(position.eps, product) * options.eps_factor, options.eps_final)
-        return _Position(position.path, relaxed.w, eps, self._form(position), relaxed, sets, named)
+        return _Position(position.path, relaxed.w, eps, self._form(position), relaxed, sets, named, f=at.f)
+
+    def _leads_up(self, position, f):
+        """Whether a path beside impacts has no feasible point, and a late relaxation is far above the one before it."""
+        late = position.eps <= LATE * ROUND_OFF and self._c.impacts and self._branches is not None
+        known = late and self.run.point is None and position.path + 1 < len(self._paths)
+        return known and f - position.f > RISE * abs(position.f)
 
     def _worth_a_branch(self, position, sets, product):
         """Whether the active sets are clear enough for a branch NLP, or the last ones."""
@@ -237,7 +253,7 @@ class Homotopy:
         self._subsolves.note(why, relaxed.w)
         self._gap.restart()
         self._branches.attempts.forget()
-        return _Position(path, self._start, self._options.eps_init)
+        return _Position(path, self._start, max(self._paths[path][0] * self._options.eps_init, self._options.eps_final))
 
     def _is_limited(self):
         """Whether only guide bounds keep the incumbent from descending."""
