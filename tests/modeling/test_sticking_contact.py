@@ -3,10 +3,13 @@
 import pyomo.environ as pyo
 import pytest
 from problems.states import over_time
+from pyomo.common.collections import ComponentSet
+from pyomo.core.expr.visitor import identify_variables
 
 import pyomo_fesd
 from pyomo_fesd import FesdError
 from pyomo_fesd.core import moving_grids
+from pyomo_fesd.core.complementarity import read_complementarity
 from tests.models import scalar_ode
 from tests.problems.running import SCHEMES, move
 
@@ -82,6 +85,18 @@ def test_each_two_points_of_an_element_are_a_pair():
 
 def pushed(cross):
     return move(block(push=0.0), 2, 2, cross_complementarity=cross)
+
+
+@pytest.mark.parametrize('cross', ['element', 'full'])
+def test_it_is_closed_only_from_a_boundary_on_at_which_the_bodies_do_not_part(cross):
+    # forces of a closed element can take away a velocity upwards, which a body has that was below between two points
+    m = move(block(push=0.0), 2, 2, cross_complementarity=cross)
+    moving = moving_grids(m)[m.t]
+    parting = moving.state_jumps.impacts.above['table', 1]
+    sides = [read_complementarity(pair) for pair in moving.pairs.values()]
+    forces = {v.name for side in sides if parting in ComponentSet(identify_variables(side.H)) for v in identify_variables(side.G)}
+    closed = [t for t in m.t if moving.grid.elements[1].left < t]
+    assert {m.table[t].find_component('_pyomo_fesd_sticking').forward.name for t in closed} <= forces
 
 
 def test_it_cannot_be_simulated():

@@ -35,24 +35,24 @@ class Attempts:
         self._solutions, self._neighbours, self.patient = solutions, neighbours, patient
         self._number, self._objectives = Counter(), {}
 
-    def point(self, w, zero, duals, final, most=NEARBY, worth=np.inf, **more):
+    def point(self, w, zero, duals, final, most=NEARBY, **more):
         """The solution of branch ``zero``, or where it has none of one beside it, which its end shows; or None.
 
         That is one without the places of least extent that keep it from having a solution, or a neighbouring one that the
-        multipliers of its end pull to, if that violates the rows by at most ``most`` and its objective is at most ``worth``.
+        multipliers of its end pull to, if that violates the rows by at most ``most``.
         """
         ways = (
             lambda: self._point(w, zero, duals, final, **more),
             lambda: self.without_short(zero, final, **more),
-            lambda: self._pulled_to(zero, most, worth, **more),
+            lambda: self._pulled_to(zero, most, **more),
         )
         found = (way() for way in ways)
         return next((point for point in found if point is not None), None)
 
-    def _pulled_to(self, zero, most, worth, **more):
+    def _pulled_to(self, zero, most, **more):
         """A solution of a neighbouring branch that the end of the failed branch ``zero`` pulls to; None without any."""
         end = self._solutions.failed(zero, most)
-        others = [] if end is None or end.f > worth else self._neighbours.pulling(end, STRONG)
+        others = [] if end is None else self._neighbours.pulling(end, STRONG)
         untried = [other for other in others if not self.tried(other)]
         found = (self._point(end.w, other, None, True, **more) for other in untried[:REPAIRS])
         return next((point for point in found if point is not None), None)

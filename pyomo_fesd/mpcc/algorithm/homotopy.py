@@ -155,7 +155,7 @@ class Homotopy:
             self._subsolves.note("go on", relaxed.w)
             return replace(position, w=relaxed.w, goes_on=True)
         if self._fails_at_once(position):
-            return self._begin(position.path + 1, "start again, other form", relaxed)
+            return self._begin(self._other_form(position.path), "start again, other form", relaxed)
         if not self._recoveries or self._hopeless():
             return None
         recovery, options = self._recoveries.pop(0), self._options
@@ -171,6 +171,11 @@ class Homotopy:
         """Whether a path fails at its first relaxation: there is no earlier one, and the forms differ most at their first eps."""
         first = position.form is None and len(self._recoveries) == len(RECOVERIES)
         return first and self._branches is not None and position.path + 1 < len(self._paths)
+
+    def _other_form(self, path):
+        """The next path that begins with another form than ``path``, or just the next one."""
+        forms = [first for _, first, _ in self._paths]
+        return next((k for k in range(path + 1, len(forms)) if forms[k] != forms[path]), path + 1)
 
     def _next(self, position, relaxed):
         """Explore the branch that the relaxation names; the position after it, or None."""

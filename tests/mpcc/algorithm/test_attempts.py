@@ -62,3 +62,24 @@ def test_a_branch_that_places_of_least_extent_make_infeasible_is_solved_without_
     point = p.branches.attempts.point(end.w, zero, None, True)
     assert (point is not None) == found
     assert not found or (point.certificate.certified and p.branches.neighbours.number_of_short(point.w) == 0)
+
+
+@pytest.mark.parametrize('part, multiplier, found', [(0.5, 1e3, True), (2.0, 1e3, False), (0.5, 1e-3, False)])
+def test_a_branch_that_fails_pulls_to_a_neighbour_that_has_a_solution(monkeypatch, part, multiplier, found):
+    p = jump_inside_a_stage()
+    p.branches.solutions.at_once = True
+    end, attempt, violation = p.run.point.nlp, p.subsolves.attempt, part * attempts.NEARBY
+    zero = p.subsolves.sets(end.w, 1e-8).zero
+
+    def contradicts(w, sides, *more, **options):
+        result = attempt(w, sides, *more, **options)
+        if not np.array_equal(sides, zero):
+            return result
+        return replace(result, w=end.w, status=STALLED, lam_x=np.full_like(result.lam_x, multiplier))
+
+    monkeypatch.setattr(p.subsolves, 'attempt', contradicts)
+    monkeypatch.setattr(p.subsolves, 'violation', lambda w: violation if np.array_equal(w, end.w) else 0.0)
+    p.branches.attempts.forget()
+    point = p.branches.attempts.point(end.w, zero, None, True)
+    assert (point is not None) == found
+    assert not found or not np.array_equal(p.subsolves.sets(point.w, 1e-8).zero, zero)

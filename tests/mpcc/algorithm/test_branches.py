@@ -272,3 +272,15 @@ def test_places_of_least_extent_are_left_out(at_once):
         assert found.certificate.certified and p.branches.neighbours.number_of_short(found.w) == 0
     else:
         assert found is None
+
+
+@pytest.mark.parametrize('multiplier, certified, pulls', [(0.0, True, False), (1e3, True, True), (0.0, False, True)])
+def test_neighbours_of_a_certified_point_are_worth_an_nlp_where_its_multipliers_pull(multiplier, certified, pulls):
+    p = jump_inside_a_stage()
+    point = p.run.point
+    grade = Stationarity.B if certified else Stationarity.LIMITED
+    nlp = replace(point.nlp, lam_x=np.full_like(point.nlp.lam_x, multiplier))
+    point = replace(point, f=1.0, nlp=nlp, certificate=replace(point.certificate, grade=grade))
+    sides = (p.branches.neighbours.zero_sides(point, neighbour, always=True) for neighbour in p.branches.neighbours.all)
+    found = [p.branches._pulls(point, zero) for zero in sides if zero is not None]
+    assert found and any(found) == pulls

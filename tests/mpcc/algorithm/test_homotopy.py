@@ -163,6 +163,24 @@ def test_beside_impacts_a_relaxation_that_is_stopped_with_products_above_eps_has
     assert Homotopy._is_on_the_path(homotopy, SimpleNamespace(stopped=stopped, w=np.zeros(2))) == goes_on
 
 
+@pytest.mark.parametrize(
+    'impacts, eps, before, point, path, leads_up',
+    [
+        ([1], 1e-4, 1.0, None, 0, True),
+        ([1], 1e-4, 1.2, None, 0, False),
+        ([1], 1e-2, 1.0, None, 0, False),
+        ([1], 1e-4, 1.0, 'a point', 0, False),
+        ([1], 1e-4, 1.0, None, 1, False),
+        ([], 1e-4, 1.0, None, 0, False),
+    ],
+)
+def test_beside_impacts_a_late_relaxation_far_above_the_one_before_leaves_the_path(impacts, eps, before, point, path, leads_up):
+    position = SimpleNamespace(eps=eps, f=before, path=path)
+    run = SimpleNamespace(point=point)
+    homotopy = SimpleNamespace(_c=SimpleNamespace(impacts=impacts), _branches='some', _paths=[1, 2], run=run)
+    assert bool(Homotopy._leads_up(homotopy, position, 1.3)) == leads_up
+
+
 @pytest.mark.parametrize('impacts, f, ends', [([1], 0.9, True), ([1], 1.1, False), ([], 0.9, False), ([1], None, False)])
 def test_beside_impacts_a_path_ends_where_its_incumbent_is_as_good_as_it_promises_also_without_a_certificate(impacts, f, ends):
     gap = GapTest(1e-6, 1e-4)
