@@ -65,11 +65,13 @@ class Neighbours:
 
         This is the sum of the multipliers by which variables that its own branch keeps at a bound, and the other one does not,
         would leave it: how much the objective falls, to first order, as each grows by 1.  Without a solution it is the violation
-        that they would reduce.
+        that they would reduce.  It is infinite where the point is the end of no NLP, or its multipliers are no numbers.
         """
         own = self._subsolves.held(nlp.w, self._subsolves.sets(nlp.w, self._biactive).zero)
-        released = np.where(self._subsolves.held(nlp.w, zero) == 0, own, 0)
-        return float(np.maximum(released * nlp.lam_x[: len(released)], 0.0).sum())
+        released = np.flatnonzero((own != 0) & (self._subsolves.held(nlp.w, zero) == 0))
+        if len(nlp.lam_x) < len(own) or not np.isfinite(nlp.lam_x[released]).all():
+            return np.inf
+        return float(np.maximum(own[released] * nlp.lam_x[released], 0.0).sum())
 
     def pulling(self, nlp, least) -> list[np.ndarray]:
         """Return the zero sides of the neighbouring branches that the end of a branch NLP pulls to, the strongest pull first."""

@@ -284,3 +284,15 @@ def test_neighbours_of_a_certified_point_are_worth_an_nlp_where_its_multipliers_
     sides = (p.branches.neighbours.zero_sides(point, neighbour, always=True) for neighbour in p.branches.neighbours.all)
     found = [p.branches._pulls(point, zero) for zero in sides if zero is not None]
     assert found and any(found) == pulls
+
+
+@pytest.mark.parametrize('lam_x', [np.zeros(0), np.array([np.nan])], ids=['none', 'no numbers'])
+def test_a_point_without_multipliers_pulls_to_every_neighbour(lam_x):
+    p = jump_inside_a_stage()
+    point = p.run.point
+    lam_x = np.broadcast_to(lam_x, len(point.nlp.lam_x)) if len(lam_x) else lam_x
+    point = replace(point, nlp=replace(point.nlp, lam_x=lam_x))
+    sides = (p.branches.neighbours.zero_sides(point, neighbour, always=True) for neighbour in p.branches.neighbours.all)
+    pulls = [p.branches.neighbours.pull(point.nlp, zero) for zero in sides if zero is not None]
+    assert pulls and np.inf in pulls and all(pull in (0.0, np.inf) for pull in pulls)
+    assert len(lam_x) or set(pulls) == {np.inf}
