@@ -164,7 +164,7 @@ class Homotopy:
         if recovery.other_form and self._c.widen() and self._branches is not None:
             self._branches.attempts.forget()
         eps = max(recovery.eps(options.eps_init, position.eps, options.eps_factor), options.eps_final)
-        path = (position.path + recovery.other_form) % len(self._paths)
+        path = self._other_form(position.path) % len(self._paths) if recovery.other_form else position.path
         return _Position(path, recovery.start(self._start, relaxed.w, self), eps)
 
     def _fails_at_once(self, position):

@@ -181,6 +181,12 @@ def test_beside_impacts_a_late_relaxation_far_above_the_one_before_leaves_the_pa
     assert bool(Homotopy._leads_up(homotopy, position, 1.3)) == leads_up
 
 
+@pytest.mark.parametrize('path, other', [(0, 2), (1, 2), (2, 3), (3, 4)])
+def test_the_other_form_is_that_of_the_next_path_that_begins_differently(path, other):
+    paths = [(1.0, 'elastic', 'elastic'), (0.1, 'elastic', 'elastic'), (1.0, 'scholtes', 'elastic'), (1.0, 'scholtes', 'scholtes')]
+    assert Homotopy._other_form(SimpleNamespace(_paths=paths), path) == other
+
+
 @pytest.mark.parametrize('impacts, f, ends', [([1], 0.9, True), ([1], 1.1, False), ([], 0.9, False), ([1], None, False)])
 def test_beside_impacts_a_path_ends_where_its_incumbent_is_as_good_as_it_promises_also_without_a_certificate(impacts, f, ends):
     gap = GapTest(1e-6, 1e-4)
