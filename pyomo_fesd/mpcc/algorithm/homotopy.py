@@ -43,8 +43,7 @@ ROUND_OFF = 1.001
 @dataclass(frozen=True)
 class _Position:
     """A position: the path's number, start and eps; form, result and active sets of the relaxation before, and the objective of
-    the branch that they named; whether the relaxation goes on from where its budget of iterations ended; the objective of the
-    relaxation before.
+    the branch that they named; whether the relaxation goes on from where its budget of iterations ended.
     """
 
     path: int
@@ -55,7 +54,6 @@ class _Position:
     sets: ActiveSets = None
     named: float = None
     goes_on: bool = False
-    f: float = np.inf
 
 
 class Homotopy:
@@ -199,13 +197,15 @@ class Homotopy:
             return self._other_path(position, relaxed)
         # no change before eps falls below the largest product
         eps = max(min(position.eps, product) * options.eps_factor, options.eps_final)
-        return _Position(position.path, relaxed.w, eps, self._form(position), relaxed, sets, named, f=at.f)
+        return _Position(position.path, relaxed.w, eps, self._form(position), relaxed, sets, named)
 
     def _leads_up(self, position, f):
         """Whether a path beside impacts has no feasible point, and a late relaxation is far above the one before it."""
-        late = position.eps <= LATE * ROUND_OFF and self._c.impacts and self._branches is not None
-        known = late and self.run.point is None and position.path + 1 < len(self._paths)
-        return known and f - position.f > RISE * abs(position.f)
+        is_late = position.eps <= LATE * ROUND_OFF and self._c.impacts and self._branches is not None
+        if not is_late or position.duals is None or self.run.point is not None or position.path + 1 == len(self._paths):
+            return False
+        before = self._c.evaluate(position.duals.w).f
+        return f - before > RISE * abs(before)
 
     def _worth_a_branch(self, position, sets, product):
         """Whether the active sets are clear enough for a branch NLP, or the last ones."""

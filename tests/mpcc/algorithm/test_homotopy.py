@@ -168,6 +168,7 @@ def test_beside_impacts_a_relaxation_that_is_stopped_with_products_above_eps_has
     [
         ([1], 1e-4, 1.0, None, 0, True),
         ([1], 1e-4, 1.2, None, 0, False),
+        ([1], 1e-4, None, None, 0, False),
         ([1], 1e-2, 1.0, None, 0, False),
         ([1], 1e-4, 1.0, 'a point', 0, False),
         ([1], 1e-4, 1.0, None, 1, False),
@@ -175,10 +176,12 @@ def test_beside_impacts_a_relaxation_that_is_stopped_with_products_above_eps_has
     ],
 )
 def test_beside_impacts_a_late_relaxation_far_above_the_one_before_leaves_the_path(impacts, eps, before, point, path, leads_up):
-    position = SimpleNamespace(eps=eps, f=before, path=path)
+    duals = None if before is None else SimpleNamespace(w=before)
+    position = SimpleNamespace(eps=eps, duals=duals, path=path)
     run = SimpleNamespace(point=point)
-    homotopy = SimpleNamespace(_c=SimpleNamespace(impacts=impacts), _branches='some', _paths=[1, 2], run=run)
-    assert bool(Homotopy._leads_up(homotopy, position, 1.3)) == leads_up
+    c = SimpleNamespace(impacts=impacts, evaluate=lambda w: SimpleNamespace(f=w))
+    homotopy = SimpleNamespace(_c=c, _branches='some', _paths=[1, 2], run=run)
+    assert Homotopy._leads_up(homotopy, position, 1.3) == leads_up
 
 
 @pytest.mark.parametrize('path, other', [(0, 2), (1, 2), (2, 3), (3, 4)])
