@@ -8,6 +8,8 @@ import numpy as np
 
 #: The remaining rise counts up to this much of the incumbent's objective, as two values in a row can mislead.
 TRUSTED = 5e-4
+#: A gap below this part of the objective is nearly closed.
+NEARLY = 1e-2
 
 
 class GapTest:
@@ -39,6 +41,10 @@ class GapTest:
         if not self._path:
             return False
         return f - self._path[-1][1] <= max(self._absolute, self._relative * abs(f), min(self._remaining_rise(), TRUSTED * abs(f)))
+
+    def nearly_closed(self, f: float) -> bool:
+        """Whether ``f`` is so near to what the homotopy promises that neighbouring branches are worth more than smaller eps."""
+        return self.closed(f) or (bool(self._path) and f - self._path[-1][1] <= NEARLY * abs(f))
 
     def _remaining_rise(self):
         """The most that the relaxed objective may still rise: sqrt(eps) extrapolated to 0 from the last two values."""

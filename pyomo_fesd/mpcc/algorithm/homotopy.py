@@ -225,8 +225,8 @@ class Homotopy:
         return None not in (before, now) and self._gap.same(max(before, now), best)
 
     def _promises_nothing(self):
-        """Whether the incumbent is as good as the path still promises: beside impacts smaller eps only lead to worse points."""
-        return bool(self._c.impacts) and self.run.point is not None and self._gap.closed(self.run.point.f)
+        """Whether the incumbent is nearly as good as the path promises: beside impacts smaller eps only lead to worse points."""
+        return bool(self._c.impacts) and self.run.point is not None and self._gap.nearly_closed(self.run.point.f)
 
     def _other_path(self, position, relaxed):
         """After a path without a certified point: the same path with wider bounds if they were missing, else the next one."""

@@ -15,6 +15,7 @@ from pyomo.common.tee import capture_output
 from pyomo_fesd.core import REDIRECTION, DeferredInterrupt
 from pyomo_fesd.mpcc.compile import automatic
 from pyomo_fesd.mpcc.nlp.deadline import Deadline
+from pyomo_fesd.mpcc.nlp.hessian_shift import HessianShift
 from pyomo_fesd.mpcc.nlp.solver import (
     DIVERGING,
     IPOPT,
@@ -32,6 +33,8 @@ from pyomo_fesd.mpcc.nlp.solver import (
 
 #: Variables and rows from which Uno's sequential quadratic programming, much the better of its presets, gets too slow.
 UNO_LARGE = 2000
+#: Variables from which the shift of a Hessian takes less time than the factorizations that it saves.
+SHIFTED = 500
 #: Ipopt's option names in Uno's.
 UNO_NAMES = {
     'max_iter': ('max_iterations',),
@@ -96,12 +99,13 @@ class _StopCallback(ca.Callback):
 
     def __init__(self, n, m, p, deadline):
         super().__init__()
-        self._sizes, self._deadline, self.interrupt = (n, m, p), deadline, DeferredInterrupt()
+        self._sizes, self._deadline, self.interrupt, self.after = (n, m, p), deadline, DeferredInterrupt(), None
         self._f, self._g, self._lam_g = map(ca.nlpsol_out().index, ('f', 'g', 'lam_g'))
         self.construct('watch', {})
 
-    def begin(self, max_iter, steepest, stalls, fall, lbg, ubg):
-        """Begin a call with its limits."""
+    def begin(self, max_iter, steepest, stalls, fall, lbg, ubg, after=None):
+        """Begin a call with its limits; ``after`` is called after each iteration."""
+        self.after = after
         self._limit, self._steepest, self._running = _Limit(max_iter, fall), steepest, 0
         self._violations = [_Violations(limit) for limit in stalls]
         self._lbg, self._ubg = (np.asarray(bound, dtype=float) for bound in (lbg, ubg))
@@ -127,6 +131,8 @@ class _StopCallback(ca.Callback):
         return True
 
     def eval_buffer(self, arg, res):
+        if self.after is not None:
+            self.after()
         # Uno does not show its objective
         self._limit.add(np.nan if arg[self._f] is None else arg[self._f].cast('d')[0])
         if self._steepest < np.inf or self._violations:
@@ -156,7 +162,7 @@ class _CasadiNlp(NlpSolver):
         """The reason why casadi does not have it, or None."""
         return None if ca.has_nlpsol(name) else f"casadi {ca.__version__} was built without it"
 
-    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None, curved=False):
         self._size, options = x.numel() + g.numel(), options or {}
         check_options(self.PLUGIN, options, self._refusal, self.GIVEN)
         self._watch = _StopCallback(x.numel(), g.numel(), p.numel(), deadline or Deadline())
@@ -165,6 +171,7 @@ class _CasadiNlp(NlpSolver):
         self._own, self._options, self._made = settings, options, {}
         self._budgets = {False: budget, True: budget | (warm or {})}
         self._name, self._problem, self._derivatives = name, {'x': x, 'p': p, 'f': f, 'g': g}, derivatives
+        self._shift = HessianShift() if curved and self.TAKES_DERIVATIVES and x.numel() >= SHIFTED else None
 
     @abstractmethod
     def _settings(self, budget, options, warm=False):
@@ -192,7 +199,10 @@ class _CasadiNlp(NlpSolver):
         if not self.TAKES_DERIVATIVES:
             return self._own
         x, p, f, g = self._problem.values()
-        return self._own | WITHOUT_PARAMETERS | derivative_functions(x, p, f, g, self._derivatives or automatic(x, f, g))
+        functions = derivative_functions(x, p, f, g, self._derivatives or automatic(x, f, g))
+        if self._shift is not None:
+            functions |= {'hess_lag': self._shift.shifted(functions['hess_lag'])}
+        return self._own | WITHOUT_PARAMETERS | functions
 
     def _solver_for(self, warm):
         """The solver for a start without or with multipliers, made when it is first needed."""
@@ -204,7 +214,7 @@ class _CasadiNlp(NlpSolver):
     def solve(self, w0, p, lbx, ubx, lbg, ubg, duals=None, max_iter=None, steepest=np.inf, stalls=(), fall=None):
         """Solve from ``w0``; see ``NlpSolver``."""
         solver = self._solver_for(duals is not None)
-        self._watch.begin(max_iter, steepest, stalls, fall, lbg, ubg)
+        self._watch.begin(max_iter, steepest, stalls, fall, lbg, ubg, self._follows(solver))
         start = {} if duals is None else {'lam_x0': duals.lam_x, 'lam_g0': duals.lam_g}
         given = {'x0': w0, 'p': p, 'lbx': lbx, 'ubx': ubx, 'lbg': lbg, 'ubg': ubg} | start
         with DeferredInterrupt() as self._watch.interrupt:
@@ -215,10 +225,20 @@ class _CasadiNlp(NlpSolver):
                 if 'An exception was raised in the solver' not in str(error):
                     raise
                 return self._failed(w0, p, len(lbg))
+            finally:
+                # it holds the solver, which holds the callback
+                self._watch.after = None
         stats = solver.stats()
         w, lam_g, lam_x = (result[key].full().ravel() for key in ('x', 'lam_g', 'lam_x'))
         status = self._watch.status or self._status(stats)
         return NlpResult(w, float(result['f']), status, _iterations(stats), lam_g, lam_x)
+
+    def _follows(self, solver):
+        """What the shift of the Hessian does after each iteration of ``solver``; None without a shift."""
+        if self._shift is None:
+            return None
+        self._shift.begin()
+        return lambda: self._shift.follow(solver.stats()['iterations']['regularization_size'][-1])
 
     def _failed(self, w0, p, m, status='error'):
         """The result if the solver returns no point."""
@@ -258,7 +278,7 @@ class CasadiUno(_CasadiNlp):
         except (OSError, AttributeError) as error:
             return f"casadi {ca.__version__} has none with a C interface ({error})"
 
-    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None, curved=False):
         x, p, f, g, derivatives = as_sx(x, p, f, g, derivatives)
         # with a violated row without variables Uno's QP solver may never return, whatever the limits
         self._varying, self._g = rows_with_variables(g, x), ca.Function('g', [x, p], [ca.densify(g)])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pyomo_fesd.mpcc.algorithm.gap_test import TRUSTED, GapTest
+from pyomo_fesd.mpcc.algorithm.gap_test import NEARLY, TRUSTED, GapTest
 
 ABSOLUTE, RELATIVE = 5e-7, 5e-5
 values = st.floats(-1e3, 1e3)
@@ -31,6 +31,13 @@ def test_one_value_closes_what_is_within_the_tolerances(f, relaxed):
 @given(f=values, below=st.floats(0, 1e3), eps=st.floats(1e-9, 1))
 def test_an_incumbent_below_the_relaxation_is_closed(f, below, eps):
     assert gap((1.0, f), (eps, f + below)).closed(f)
+
+
+@given(f=values, relaxed=values)
+def test_a_gap_is_nearly_closed_by_a_part_of_the_objective_or_where_it_is_closed(f, relaxed):
+    test = gap((1.0, relaxed))
+    assert test.nearly_closed(f) == (test.closed(f) or f - relaxed <= NEARLY * abs(f))
+    assert not gap().nearly_closed(f)
 
 
 @given(f=st.floats(1, 1e3), root=st.floats(1e-6, 1e-4), eps=st.floats(1e-8, 1e-2), factor=st.floats(0.05, 0.5))
