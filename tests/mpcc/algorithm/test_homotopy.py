@@ -193,7 +193,7 @@ def test_the_other_form_is_that_of_the_next_path_that_begins_differently(path, o
 @pytest.mark.parametrize(
     'impacts, f, ends', [([1], 0.9, True), ([1], 1.005, True), ([1], 1.02, False), ([], 0.9, False), ([1], None, False)]
 )
-def test_beside_impacts_a_path_ends_where_its_incumbent_is_nearly_as_good_as_it_promises_also_without_a_certificate(impacts, f, ends):
+def test_beside_impacts_a_path_ends_where_its_incumbent_is_nearly_as_good_as_it_promises_without_a_certificate(impacts, f, ends):
     gap = GapTest(1e-6, 1e-4)
     gap.add(1e-3, 1.0)
     point = None if f is None else SimpleNamespace(f=f)

@@ -23,12 +23,12 @@ def budgets(monkeypatch):
 
 
 @pytest.fixture
-def warm(monkeypatch):
-    """The names of the NLP solvers that are made with a budget for a start with multipliers, and this budget."""
-    made, init = {}, CasadiIpopt.__init__
+def lasts(monkeypatch):
+    """Of each NLP solver that is made the name, the budget of a start with multipliers, and whether its Hessian is shifted."""
+    made, init = [], CasadiIpopt.__init__
 
     def watched(self, name, *args):
-        made.update({name: args[-1]} if args[-1] else {})
+        made.append((name, *args[-2:]))
         init(self, name, *args)
 
     monkeypatch.setattr(CasadiIpopt, '__init__', watched)
@@ -73,11 +73,11 @@ def test_a_problem_without_parts_has_ipopts_own_scaling(budgets):
     assert budgets and not any('nlp_scaling_max_gradient' in budget for _, budget in budgets)
 
 
-def solve_ball():
+def solve_ball(**options):
     """Solve a ball that bounces, without a simulation before."""
     m = contacts.ball(0.5)
     pyo.TransformationFactory('fesd.finite_elements').apply_to(m, nfe=4, ncp=2)
-    pyo.SolverFactory('mpec_hybrid').solve(m, simulate_first=False)
+    pyo.SolverFactory('mpec_hybrid').solve(m, **{'simulate_first': False} | options)
 
 
 def test_beside_impacts_ipopt_scales_as_ever(budgets):
@@ -85,8 +85,20 @@ def test_beside_impacts_ipopt_scales_as_ever(budgets):
     assert budgets and not any('nlp_scaling_max_gradient' in budget for _, budget in budgets)
 
 
-def test_only_relaxations_beside_impacts_are_centred_where_they_start_with_multipliers(budgets, warm):
+def test_only_relaxations_beside_impacts_are_centred_where_they_start_with_multipliers(budgets, lasts):
     solve_steep(1.0)
-    assert budgets and not warm
+    assert budgets and not any(warm for _, warm, _ in lasts)
     solve_ball()
-    assert set(warm) == {name for name, _ in budgets} & {'elastic', 'scholtes'} and all(b == CENTRED for b in warm.values())
+    relaxations = {name for name, _ in budgets} & {'elastic', 'scholtes'}
+    assert {name for name, warm, _ in lasts if warm} == relaxations and all(warm in (None, CENTRED) for _, warm, _ in lasts)
+
+
+def test_hessians_are_shifted_beside_impacts_where_no_simulation_completes_points(lasts):
+    solve_steep(1.0)
+    assert lasts and not any(curved for *_, curved in lasts)
+    lasts.clear()
+    solve_ball()
+    assert {name for name, *_ in lasts} >= {'elastic', 'branch'} and all(curved for *_, curved in lasts)
+    lasts.clear()
+    solve_ball(simulate_first=True)
+    assert 'branch' in {name for name, *_ in lasts} and not any(curved for *_, curved in lasts)
