@@ -6,7 +6,7 @@ Does not apply: to other solvers, which do not show what they add.
 
 Where the Hessian W of the Lagrangian has negative curvature, Ipopt factorizes with W, then with W + delta I, where delta is a third
 of the last one, then with ever larger ones (algorithm IC of Waechter, Biegler, Math. Program. 106 (2006) 25).  As long as the
-curvature stays, the first trial is in vain: relaxations of a hopper had 2.4 factorizations an iteration, and have 1.5 with a shift.
+curvature stays, the first trial is in vain: relaxations of a hopper had 2.4 factorizations an iteration, and have 1.4 with a shift.
 """
 
 import casadi as ca
