@@ -92,7 +92,7 @@ class _Callbacks:
 class CyIpopt(NlpSolver):
     """Ipopt of the system.  Our defaults that its version does not know are left out.  See ``NlpSolver``."""
 
-    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None, curved=False):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None, shifts=False):
         x, p, f, g, derivatives = as_sx(x, p, f, g, derivatives)
         d = derivatives or automatic(x, f, g)
         # Ipopt expects the lower triangle

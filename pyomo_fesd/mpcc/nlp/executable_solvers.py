@@ -58,7 +58,7 @@ class Executable(NlpSolver):
         name for Pyomo's ``SolverFactory``
     """
 
-    def __init__(self, solver, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None, curved=False):
+    def __init__(self, solver, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None, shifts=False):
         options = options or {}
         check_options(solver, options, partial(_refusal, solver))
         defaults = {key: value for key, value in (IPOPT | budget).items() if key not in ('print_level', 'sb')}

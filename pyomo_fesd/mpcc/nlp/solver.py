@@ -147,9 +147,9 @@ class NlpSolver(ABC):
         the user's, in the solver's own names; they override ours
     warm : dict, optional
         ``budget`` of a start with multipliers, besides the other one
-    curved : bool
-        whether the Hessian of the Lagrangian has negative curvature on most of the way: casadi's Ipopt then shifts it by a part of
-        what it last added itself (``HessianShift``)
+    shifts : bool
+        whether casadi's Ipopt gets a Hessian shifted by a part of what it last added itself (``HessianShift``), which pays where
+        curvature is negative on most of the way
 
     Raises
     ------
@@ -163,7 +163,7 @@ class NlpSolver(ABC):
         return None
 
     @abstractmethod
-    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None, curved=False):
+    def __init__(self, name, x, p, f, g, budget, deadline=None, derivatives=None, options=None, warm=None, shifts=False):
         pass
 
     @abstractmethod

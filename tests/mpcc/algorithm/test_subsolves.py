@@ -95,10 +95,10 @@ def test_only_relaxations_beside_impacts_are_centred_where_they_start_with_multi
 
 def test_hessians_are_shifted_beside_impacts_where_no_simulation_completes_points(lasts):
     solve_steep(1.0)
-    assert lasts and not any(curved for *_, curved in lasts)
+    assert lasts and not any(shifts for *_, shifts in lasts)
     lasts.clear()
     solve_ball()
-    assert {name for name, *_ in lasts} >= {'elastic', 'branch'} and all(curved for *_, curved in lasts)
+    assert {name for name, *_ in lasts} >= {'elastic', 'branch'} and all(shifts for *_, shifts in lasts)
     lasts.clear()
     solve_ball(simulate_first=True)
-    assert 'branch' in {name for name, *_ in lasts} and not any(curved for *_, curved in lasts)
+    assert 'branch' in {name for name, *_ in lasts} and not any(shifts for *_, shifts in lasts)

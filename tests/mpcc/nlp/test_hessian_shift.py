@@ -50,11 +50,11 @@ def test_the_shift_is_a_part_of_the_whole_and_fades(shift):
     assert shift.eval([0.0]) == [0.0]
 
 
-def chain(n, curved, capfd, **options):
+def chain(n, shifts, capfd, **options):
     """A chain of springs on a plate with hollows, from the middle between them: its solution, and how often Ipopt added to W."""
     x, p = ca.SX.sym('x', n), ca.SX.sym('p')
     f = ca.sum1(ca.cos(3 * x)) + p * ca.sumsqr(x[1:] - x[:-1])
-    solver = CasadiIpopt('chain', x, p, f, x[0] + x[-1], {'tol': 1e-9}, options={'print_level': 5} | options, curved=curved)
+    solver = CasadiIpopt('chain', x, p, f, x[0] + x[-1], {'tol': 1e-9}, options={'print_level': 5} | options, shifts=shifts)
     start = 0.1 * np.sin(np.arange(n))
     capfd.readouterr()
     result = solver.solve(start, [0.05], np.full(n, -5.0), np.full(n, 5.0), np.zeros(1), np.zeros(1))
