@@ -91,14 +91,15 @@ class BranchSolutions:
         """The certified solution of a branch; None if it has none, or if its objective is clearly not ``below`` another one.
 
         One that is above ``enough`` does not count either: its LPEC may take longer than all NLPs, and its answer would not matter.
-        From the same values the same branch is solved once: neighbours of points that hardly differ lead to it again and again.
+        From the same values the same branch is solved once, whatever the names of its sides before they are settled: neighbours of
+        points that hardly differ lead to it again and again.
         """
         if duals is not None or 'box' in more:
             return self._point(self._solution(w, zero, duals, below, **more), below, enough)
         start = self._subsolves.on_sides(w, zero)
         if start is None:
             return None
-        key = hash((start.tobytes(), zero.tobytes(), self._bounds(), *sorted(more.items())))
+        key = hash((start.tobytes(), self._subsolves.settled(w, zero).tobytes(), self._bounds(), *sorted(more.items())))
         found = self._known.get(key)
         if found is None or (found.is_left and not _is_clearly_above(found.f, below)):
             self._known[key] = found = self._solution(w, zero, duals, below, **more)
