@@ -100,3 +100,21 @@ def test_a_solution_that_another_branch_has_too_is_certified_once(first, then, i
     solutions = BranchSolutions(SimpleNamespace(compiled=compiled, tolerances=TOLERANCES, certify=certify))
     one, other = (point(**SOLUTION | some) for some in (first, then))
     assert len(done) == 1 + is_new and (other.nlp is one.nlp) == (not is_new)
+
+
+@pytest.mark.parametrize('name, solved', [([0, 1], 1), ([0, 0], 2)])
+def test_a_branch_is_solved_once_whatever_the_names_of_its_sides(name, solved, monkeypatch):
+    bounds = SimpleNamespace(lbx=np.zeros(2), ubx=np.ones(2))
+    # the first pair leads the second one
+    settles = {(1, 1): (0, 1)}
+    subsolves = SimpleNamespace(
+        compiled=bounds,
+        tolerances=TOLERANCES,
+        on_sides=lambda w, zero: w,
+        settled=lambda w, zero: np.array(settles.get(tuple(zero), zero)),
+    )
+    solutions, runs = BranchSolutions(subsolves), []
+    monkeypatch.setattr(solutions, '_solution', lambda w, zero, *_, **more: runs.append(zero) or _Solution())
+    for zero in ([1, 1], name):
+        assert solutions.certified(np.zeros(2), np.array(zero)) is None
+    assert len(runs) == solved

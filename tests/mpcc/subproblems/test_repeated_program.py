@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import highspy
 import numpy as np
 import pytest
 from scipy import sparse
@@ -40,3 +41,31 @@ def test_where_the_simplex_method_does_not_end_others_give_multipliers_that_prov
     assert repeated.basis is None
     assert Descent(program, list).least(repeated.solve(program.high).y) == pytest.approx(value, abs=1e-3)
     assert program.cost @ repeated.optimum(program.high).d == pytest.approx(value, abs=1e-7)
+
+
+class JustMissing:
+    """HiGHS whose first run misses the tolerances by its own account."""
+
+    def __init__(self, highs):
+        self._highs, self._runs, self.strategies = highs, 0, []
+
+    def __getattr__(self, name):
+        return getattr(self._highs, name)
+
+    def run(self):
+        self._runs += 1
+        self.strategies.append(self._highs.getOptionValue('simplex_strategy')[1])
+        return self._highs.run()
+
+    def getModelStatus(self):  # noqa: N802
+        return highspy.HighsModelStatus.kUnknown if self._runs == 1 else self._highs.getModelStatus()
+
+
+def test_where_the_dual_method_misses_the_tolerances_the_primal_one_goes_on_and_the_next_run_is_dual_again():
+    program = drawn(0)
+    repeated = RepeatedProgram(program, {}, Deadline())
+    repeated._highs = missing = JustMissing(repeated._highs)
+    value = program.cost @ solve(program, {}, Deadline()).d
+    assert program.cost @ repeated.optimum(program.high).d == pytest.approx(value, abs=1e-7)
+    repeated.solve(0.5 * program.high)
+    assert missing.strategies == [repeated_program.DUAL, repeated_program.PRIMAL, repeated_program.DUAL]
