@@ -2,7 +2,7 @@
 
 Without a basis the dual simplex method makes a pivot for each equation first: of a collocated model that is nearly one for each
 column, and most of the time of a program whose optimum is d = 0.  A matching of equations and columns names these pivots at once.
-HiGHS repairs a basis that is singular, and begins without one where it does not like what it finds.
+HiGHS repairs a basis that is singular, and begins without one where what it finds is ill-conditioned.
 
 Takes: an equilibrated program.
 Leaves: a basis, feasible or not: all columns have bounds, so that each basis is dual feasible with some of them.
@@ -14,8 +14,8 @@ from scipy.sparse.csgraph import maximum_bipartite_matching
 
 #: An equation may leave its sides so far apart: residuals of round-off make it an interval.
 EQUATION = 1e-9
-#: Smaller entries of a row, which reaches 1, are no pivots.  (Of 109 programs of discs, carts, a ball and hoppers HiGHS began
-#: without the basis in 13; with 1e-2 in 14, with 0.3 in 3, with more iterations in the others.)
+#: Smaller entries of a row, which reaches 1, are no pivots.  (109 programs of discs, carts, a ball and hoppers took 33,000 pivots
+#: with this, 49,000 with 0.01, 42,000 with 0.3, and 350,000 without a basis.)
 PIVOT = 0.1
 
 

@@ -17,13 +17,16 @@ import numpy as np
 from pyomo_fesd.mpcc.subproblems.equations_basis import equations_basis
 from pyomo_fesd.mpcc.subproblems.linear_program import ATTEMPTS, Answer, highs_of, holds, run, set_options, settings_of, solve
 
-#: Iterations of the simplex method before the next attempt, for each row and column: without a basis, and from the last one.
-FIRST, AGAIN = 1.0, 0.1
+#: Iterations of the simplex method before the next attempt, for each row and column: without a basis, from the last one, and from
+#: an optimum without scaling.
+FIRST, AGAIN, RESCALED = 1.0, 0.1, 0.05
 #: Rows from which on a program is large: its first run has a basis, while smaller ones are solved in a few milliseconds.
 LARGE = 500
 #: HiGHS' numbers of two ways to price: Devex begins at any basis as it is; HiGHS' choice, steepest edges, computes the length of
 #: each edge first, which takes most of a run from the last basis.
 DEVEX, CHOSEN = 1, -1
+#: HiGHS' numbers of a program as it is, and of its own scaling.
+UNSCALED, SCALED = 0, 2
 #: Settings of the simplex method, each for as long as it ends: on degenerate programs, equilibrated already, any of them may not.
 #: Large ones begin without HiGHS' own scaling.  (Of small ones the multipliers that it gives prove more: a ball that meets the
 #: ground at the last time, 12 of 45 times, is certified by these only.)
@@ -33,7 +36,7 @@ WAYS = tuple(
         'dual_simplex_cost_perturbation_multiplier': perturbation,
         'simplex_dual_edge_weight_strategy': pricing,
     }
-    for scaling, perturbation, pricing in ((2, 1.0, DEVEX), (0, 1.0, DEVEX), (2, 0.0, CHOSEN))
+    for scaling, perturbation, pricing in ((SCALED, 1.0, DEVEX), (UNSCALED, 1.0, DEVEX), (SCALED, 0.0, CHOSEN))
 )
 #: HiGHS' numbers of the simplex methods.
 DUAL, PRIMAL = 1, 4
@@ -67,6 +70,7 @@ class RepeatedProgram:
     def optimum(self, high):
         """The ``Answer`` that is optimal with the upper bounds ``high`` and holds, or None."""
         answer = self._from_last_basis(high)
+        answer = None if answer is None else self._rescaled(answer)
         if answer is not None and holds(replace(self._p, high=self._high), answer.d / self._given.reach):
             return answer
         return solve(replace(self._given, high=high), self._options, self._deadline)
@@ -82,7 +86,7 @@ class RepeatedProgram:
         if self._deadline.at is not None:
             # the limit is one of all runs together
             self._highs.setOptionValue('time_limit', self._highs.getRunTime() + self._deadline.left())
-        self._highs.setOptionValue('simplex_iteration_limit', int(self._limit * sum(self._p.A.shape)))
+        self._limit_iterations(self._limit)
         if self._ends_well(self._highs) or self._ends_well_by_primal():
             self._limit, self._basis = AGAIN, self._highs.getBasis()
             return self._answer(self._highs)
@@ -90,6 +94,21 @@ class RepeatedProgram:
         self.restart(self._basis)
         set_options(self._highs, next(self._ways) | self._options)
         return None
+
+    def _rescaled(self, answer):
+        """The optimum with HiGHS' own scaling, some pivots from that of an ``answer`` without it; where it has none, the answer.
+
+        What rows miss by the tolerances may be worth a descent that is none (a motor: 2e-3, with multipliers of 3e8).
+        """
+        given = self._highs.getOptionValue('simplex_scale_strategy')[1]
+        if given != UNSCALED or 'simplex_scale_strategy' in self._options:
+            return answer
+        self._highs.setOptionValue('simplex_scale_strategy', SCALED)
+        self._limit_iterations(RESCALED)
+        again = self._answer(self._highs) if self._ends_well(self._highs) else None
+        self._highs.setOptionValue('simplex_scale_strategy', given)
+        self.restart(self._basis)
+        return answer if again is None else again
 
     @property
     def basis(self):
@@ -112,6 +131,9 @@ class RepeatedProgram:
             if answer is not None:
                 return answer
         return None
+
+    def _limit_iterations(self, limit):
+        self._highs.setOptionValue('simplex_iteration_limit', int(limit * sum(self._p.A.shape)))
 
     def _made(self, settings):
         return highs_of(self._p, settings_of(ATTEMPTS[0], 0, self._deadline, settings | self._options))
