@@ -69,3 +69,22 @@ def test_where_the_dual_method_misses_the_tolerances_the_primal_one_goes_on_and_
     assert program.cost @ repeated.optimum(program.high).d == pytest.approx(value, abs=1e-7)
     repeated.solve(0.5 * program.high)
     assert missing.strategies == [repeated_program.DUAL, repeated_program.PRIMAL, repeated_program.DUAL]
+
+
+@pytest.mark.parametrize('given', [{}, {'simplex_scale_strategy': 0}])
+def test_an_optimum_of_a_large_program_is_one_with_scaling_too_unless_the_user_chooses(given, monkeypatch):
+    monkeypatch.setattr(repeated_program, 'LARGE', 0)
+    program, scalings = drawn(0), []
+    real = repeated_program.run
+
+    def run(highs):
+        scalings.append(highs.getOptionValue('simplex_scale_strategy')[1])
+        real(highs)
+
+    monkeypatch.setattr(repeated_program, 'run', run)
+    repeated = RepeatedProgram(program, given, Deadline())
+    value = program.cost @ solve(program, {}, Deadline()).d
+    for _ in range(2):
+        assert program.cost @ repeated.optimum(program.high).d == pytest.approx(value, abs=1e-7)
+    once = [repeated_program.UNSCALED] if given else [repeated_program.UNSCALED, repeated_program.SCALED]
+    assert scalings == 2 * once
