@@ -58,9 +58,9 @@ class RepeatedProgram:
     def __init__(self, program, options, deadline):
         self._given, self._options, self._deadline = program, options, deadline
         self._p, self._rows, self._factor = program.equilibrated()
-        self._is_large = len(program.high) >= LARGE
-        self._high, self._limit, self._ways = self._p.high, FIRST, islice(cycle(WAYS), int(self._is_large), None)
-        self._highs, self._basis, self._is_first = self._made(next(self._ways)), None, True
+        self._needs_basis = len(program.high) >= LARGE
+        self._high, self._limit, self._ways = self._p.high, FIRST, islice(cycle(WAYS), int(self._needs_basis), None)
+        self._highs, self._basis = self._made(next(self._ways)), None
 
     def solve(self, high):
         """An ``Answer`` with the upper bounds ``high`` of the rows, of which nothing is promised; None where HiGHS has none."""
@@ -80,9 +80,9 @@ class RepeatedProgram:
         changed = np.flatnonzero(high != self._high)
         self._high = high
         self._change(self._highs, changed)
-        if self._is_first and self._is_large:
+        if self._needs_basis:
             self._highs.setBasis(equations_basis(self._p, high))
-        self._is_first = False
+            self._needs_basis = False
         if self._deadline.at is not None:
             # the limit is one of all runs together
             self._highs.setOptionValue('time_limit', self._highs.getRunTime() + self._deadline.left())
